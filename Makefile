@@ -1,0 +1,43 @@
+# Every target sets up .venv by itself; the stamp is renewed when pyproject.toml changes.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+STUBS := $(VENV)/stubs
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test lint bench docs clean
+
+demo: $(STAMP)
+	@$(BIN)/barberpole demo
+
+test: lint
+	@$(BIN)/python -m pytest -n 2
+	@echo "make test: lint and all tests passed"
+
+lint: $(STAMP) $(STUBS)/.installed
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check --quiet || { $(BIN)/ruff format --diff --quiet; echo "run: $(BIN)/ruff format"; exit 1; }
+	@$(BIN)/pyright --warnings
+	@$(BIN)/pyright --warnings --project firmware/pyrightconfig.json
+
+bench: $(STAMP)
+	@$(BIN)/python -m pytest -m bench -s
+
+docs: $(STAMP)
+	@$(BIN)/python -m barberpole.docs host/docs
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis
+
+$(STAMP): pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "installing barberpole and its tools into $(VENV) (once)"
+	@$(PIP) --upgrade pip
+	@$(PIP) --editable '.[twin,test]'
+	@touch $@
+
+# The stubs of MicroPython's modules shadow the standard library, so they live apart from the packages of .venv.
+$(STUBS)/.installed: $(STAMP)
+	@$(PIP) --upgrade --target $(STUBS) micropython-stm32-pybv11-stubs
+	@touch $@

@@ -1,0 +1,38 @@
+"""Files are replaced whole: a reader sees the old one or the new one, never half of one."""
+
+import os
+from pathlib import Path
+
+from barberpole.errors import InputError, must
+
+
+def write_atomic(path: str | Path, content: bytes | str) -> None:
+    """Write `content` (text as UTF-8) beside `path` and move it into place.
+
+    Raises InputError when the folder is absent or cannot be written; nothing is left behind then.
+    """
+    path = Path(path)
+    data = content.encode() if isinstance(content, str) else content
+    beside = path.with_name(f"{path.name}.tmp-{os.getpid()}")
+    try:
+        beside.write_bytes(data)
+        beside.replace(path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise InputError(must("the output file", "in a folder that can be written", error.strerror, path)) from None
+
+
+def read_bytes(path: str | Path, what: str) -> bytes:
+    """Content of a file. Raises InputError naming `what` it should have been ("the log", "the board file")."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(must(what, "a file that can be read", error.strerror, path)) from None
+
+
+def read_text(path: str | Path, what: str) -> str:
+    """Text of a UTF-8 file. Raises InputError as `read_bytes`, and where the text is not UTF-8."""
+    try:
+        return read_bytes(path, what).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(must(what, "UTF-8 text", f"byte {error.object[error.start]:#04x}", path)) from None
