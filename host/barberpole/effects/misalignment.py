@@ -1,0 +1,56 @@
+"""Misalignment: the sensitive directions are not the axes of the reference frame (thesis 4.2).
+
+    h_i = (B_i + sum_j e_ij B_j) / sqrt(1 + sum_j e_ij^2)                            (1)
+
+e_ij is the tangent of the angle from axis i towards axis j; each row is a unit vector, so that `scale` stays the true
+sensitivity at any mounting angle (the article's norm of the base vector, 2.2.1). With a vector reference all six e_ij
+can be seen; when only the magnitude is known a common rotation cannot, and the upper triangle remains (4.15-4.18).
+"""
+
+import numpy as np
+
+from barberpole.effects.effect import Conditions, Effect, Param, Setup
+
+UPPER = ("xy", "xz", "yz")
+LOWER = ("yx", "zx", "zy")
+_ANGLE = {"unit": "rad", "typical": 0.02, "lower": -20.0, "upper": 20.0}
+
+
+def params(setup: Setup):
+    """The e_ij that this reference can determine, in rad (tangents)."""
+    return tuple(Param(name, **_ANGLE) for name in (UPPER + LOWER if setup.reference == "vector" else UPPER))
+
+
+def matrix(p):
+    """The rows of (1), 3 x 3, unit norm."""
+    rows = np.eye(3, dtype=np.result_type(np.asarray(p), float))
+    for name, value in zip(UPPER + LOWER, p, strict=False):
+        rows["xyz".index(name[0]), "xyz".index(name[1])] = value
+    return rows / np.sqrt(np.sum(rows * rows, axis=1))[:, None]
+
+
+def forward(xyz, p, at: Conditions):
+    """Eq. (1), µT."""
+    return tuple(matrix(p) @ np.asarray(xyz))
+
+
+def undo(xyz, p, at: Conditions):
+    """Inverse of (1)."""
+    x, y, z = xyz
+    return tuple(float(a) * x + float(b) * y + float(c) * z for a, b, c in np.linalg.inv(matrix(p)))
+
+
+def jacobian(xyz, p, at: Conditions):
+    """Derivatives of (1)."""
+    unit, field = matrix(p), np.asarray(xyz)
+    out = unit @ field
+    d_p = np.zeros((3, len(p), field.shape[1]))
+    for column, name in enumerate((UPPER + LOWER)[: len(p)]):
+        i, j = "xyz".index(name[0]), "xyz".index(name[1])
+        d_p[i, column] = unit[i, i] * (field[j] - unit[i, j] * out[i])  # d (row / |row|) / d e_ij
+    return np.repeat(unit[:, :, None], field.shape[1], axis=2), d_p
+
+
+MISALIGNMENT = Effect(
+    "misalignment", "h_i = (B_i + sum e_ij B_j) / norm", "thesis 4.2, 4.15-4.18; article 2.2.1", params, forward, undo, jacobian
+)

@@ -1,0 +1,164 @@
+"""Fit a model to a log: parameters, covariance, what cannot be determined, and the error on stretches left out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from barberpole.effects import Effect, Setup
+from barberpole.errors import InputError
+from barberpole.fit import observability
+from barberpole.fit.gram import Gram, heldout_rms
+from barberpole.fit.residual import Problem
+from barberpole.fit.solve import Solution, minimise
+from barberpole.fit.start import Linear, linear_part, start_values
+from barberpole.log import Log
+from barberpole.model import Model, compose, find_effect
+from barberpole.modelfile import ModelFile
+from barberpole.observations import Observations, observations
+
+NOMINAL_MAGNITUDE_UT = 50.0  # where only its constancy is known; the scale is then relative to it
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model: the problem, the parameters p (P,) and covariance (P, P), and how well it does.
+
+    rms_lsb over all residuals; heldout_rms_lsb over stretches fitted without them; unobservable: names of parameters
+    that this log cannot determine, which stay at their null.
+    """
+
+    problem: Problem
+    p: np.ndarray
+    covariance: np.ndarray
+    gram: Gram
+    free: np.ndarray
+    converged: bool
+    linear: Linear
+
+    @property
+    def model(self) -> Model:
+        return self.problem.model
+
+    @property
+    def stderr(self) -> np.ndarray:
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def unobservable(self) -> tuple[str, ...]:
+        return tuple(n for n, free in zip(self.model.names, self.free, strict=True) if not free)
+
+    @property
+    def rms_lsb(self) -> float:
+        return self.gram.rms()
+
+    @property
+    def heldout_rms_lsb(self) -> float:
+        return heldout_rms(self.gram.take(np.flatnonzero(self.free)))
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the free columns: above 30 the log's geometry hardly carries the model."""
+        return observability.condition(self.gram, self.free)
+
+    def field(self) -> np.ndarray:
+        """(3, n) µT: each reading taken back through the model."""
+        seen = self.problem.seen
+        return np.concatenate(
+            [self.model.invert(seen.y[:, r], self.p, seen.at.take(r)) for r in self.problem.chunks()], axis=1
+        )
+
+    def rms_ut(self) -> float:
+        """RMS error of the calibrated field: by component against a known field, else of the magnitude."""
+        seen, field = self.problem.seen, self.field()
+        if seen.b_ut is not None:
+            return float(np.sqrt(np.mean((field - seen.b_ut) ** 2)))
+        return float(np.sqrt(np.mean((np.linalg.norm(field, axis=0) - self.problem.magnitude(slice(None))) ** 2)))
+
+    def rms_norm_percent(self) -> float | None:
+        """RMS of |B|/K - 1 in %, for scalar references."""
+        if self.problem.vector:
+            return None
+        ratio = np.linalg.norm(self.field(), axis=0) / self.problem.magnitude(slice(None))
+        return float(100.0 * np.sqrt(np.mean((ratio - 1.0) ** 2)))
+
+
+def fit_log(log: Log, file: ModelFile, extra: Sequence[Effect] = (), tick: Callable[[int], None] | None = None) -> Fit:
+    """Fit the effects of a model file to a log."""
+    return fit_observations(observations(log), file, extra, tick)
+
+
+def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect] = (), tick=None) -> Fit:
+    """Fit the effects of a model file to observations. Raises InputError where the log lacks a column an effect needs."""
+    problem, linear = prepare(seen, file, extra)
+    return fit_problem(problem, linear, tick=tick)
+
+
+def prepare(seen: Observations, file: ModelFile, extra: Sequence[Effect] = ()) -> tuple[Problem, Linear]:
+    """The problem and its linear start."""
+    require_columns(seen, file.effects, extra)
+    seen = with_reference(seen, file)
+    magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
+    linear = linear_part(seen, magnitude)
+    model = compose(file.effects, setups(seen, file, linear, extra), extra)
+    return Problem(model, seen, magnitude), linear
+
+
+def with_reference(seen: Observations, file: ModelFile) -> Observations:
+    """Observations with the model file's reference temperature and easy axes."""
+    at = replace(seen.at, t0_c=float(file.reference.get("temp_c", seen.at.t0_c)))
+    return replace(seen, at=at)
+
+
+def setups(seen: Observations, file: ModelFile, linear: Linear, extra: Sequence[Effect] = ()) -> dict[str, Setup]:
+    """What each effect may adapt its parameters to."""
+    common = Setup(
+        reference=seen.reference,
+        flipping=flipping(seen),
+        lsb_per_ut=linear.lsb_per_ut or 1.0,
+        span_ut=1.5 * linear.span_ut,
+    )
+    names = {find_effect(name, extra).name for name in file.effects} | {e.name for e in extra}
+    return {name: replace(common, settings=file.settings.get(name, {})) for name in names}
+
+
+def flipping(seen: Observations) -> str:
+    """Whether SET and RESET readings are both there, and with which sign RESET came."""
+    state = np.asarray(seen.at.state)
+    if not (np.any(state > 0) and np.any(state < 0)):
+        return "none"
+    return "raw" if seen.raw_polarity else "corrected"
+
+
+def require_columns(seen: Observations, names: Sequence[str], extra: Sequence[Effect] = ()) -> None:
+    """Raise InputError if an effect needs what the log does not have."""
+    held = {"temp_c": seen.at.temp_c, "load_a": seen.at.load_a, "t_s": seen.at.t_s, "i_ma": seen.at.i_ma}
+    for name in names:
+        effect = find_effect(name, extra)
+        for column in effect.requires:
+            if held.get(column) is None:
+                raise InputError(f"log must have a {column} column for effect {effect.name}; got none")
+
+
+def fit_problem(problem: Problem, linear: Linear, start: np.ndarray | None = None, tick=None) -> Fit:
+    """Minimise, freezing what the log cannot determine: first what is dependent, then what is undetermined."""
+    p = start_values(problem.model, linear) if start is None else start
+    null, free = problem.model.null, np.ones(len(p), bool)
+    if problem.n * problem.residuals_per_sample <= len(p):
+        raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
+    while True:
+        solution = minimise(problem, p, free, tick)
+        keep = observability.independent(solution.gram, free)
+        if np.array_equal(keep, free):
+            worst = observability.undetermined(problem.model, solution.gram, free)
+            if worst is None:
+                return _finish(problem, linear, solution)
+            keep = free.copy()
+            keep[worst] = False
+        p = np.where(free & ~keep, null, solution.p)
+        free = keep
+
+
+def _finish(problem: Problem, linear: Linear, solution: Solution) -> Fit:
+    cov = observability.covariance(solution.gram, solution.free)
+    return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear)

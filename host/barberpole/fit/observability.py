@@ -1,0 +1,55 @@
+"""What a log can determine: parameters it cannot are named and left at their null, never returned as a number."""
+
+import numpy as np
+
+from barberpole.fit.gram import Gram
+from barberpole.model import Model
+
+RANK = 1e-10  # squared sine of the angle to the earlier parameters' columns below which a column adds nothing
+USELESS = 3.0  # a standard error this many times the size a real sensor shows says nothing about it
+
+
+def independent(gram: Gram, free: np.ndarray) -> np.ndarray:
+    """Mask of the free parameters whose columns are not combinations of earlier ones (stack order breaks ties)."""
+    h = gram.jj.sum(axis=0)
+    size = np.sqrt(np.diag(h))
+    usable = free & (size > 1e-12 * max(size.max(initial=0.0), 1e-300))
+    size = np.where(usable, size, 1.0)
+    corr = h / np.outer(size, size)
+    keep = np.zeros_like(free)
+    for j in np.flatnonzero(usable):
+        kept = np.flatnonzero(keep)
+        if kept.size:
+            within = corr[np.ix_(kept, kept)]
+            left = 1.0 - corr[j, kept] @ np.linalg.solve(within, corr[kept, j])
+        else:
+            left = 1.0
+        keep[j] = left > RANK
+    return keep
+
+
+def covariance(gram: Gram, free: np.ndarray) -> np.ndarray:
+    """(P, P) covariance of the parameters; rows of parameters that are not free are zero."""
+    h = gram.jj.sum(axis=0)[np.ix_(free, free)]
+    size = np.sqrt(np.diag(h))
+    out = np.zeros((free.size, free.size))
+    variance = gram.cost / max(gram.count - int(free.sum()), 1)
+    out[np.ix_(free, free)] = variance * np.linalg.inv(h / np.outer(size, size)) / np.outer(size, size)
+    return out
+
+
+def undetermined(model: Model, gram: Gram, free: np.ndarray) -> int | None:
+    """The free parameter least determined, if its standard error exceeds what a real sensor could show; else None."""
+    stderr = np.sqrt(np.maximum(np.diag(covariance(gram, free)), 0.0))
+    typical = np.array([abs(q.typical) if q.typical else np.inf for q in model.params])
+    ratio = np.where(free, stderr / typical, 0.0)
+    worst = int(np.argmax(ratio))
+    return worst if ratio[worst] > USELESS else None
+
+
+def condition(gram: Gram, free: np.ndarray) -> float:
+    """Condition number of the free parameters' columns, each brought to unit size."""
+    h = gram.jj.sum(axis=0)[np.ix_(free, free)]
+    size = np.sqrt(np.diag(h))
+    values = np.linalg.eigvalsh(h / np.outer(size, size))
+    return float(np.sqrt(values[-1] / max(values[0], 1e-300)))
