@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
 .PHONY: demo test lint bench docs clean
 
@@ -33,7 +33,6 @@ clean:
 $(STAMP): pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "installing barberpole and its tools into $(VENV) (once)"
-	@$(PIP) --upgrade pip
 	@$(PIP) --editable '.[twin,test]'
 	@touch $@
 
