@@ -1,0 +1,1 @@
+"""The cable: flashing, recording and pulling through mpremote and pyserial."""
