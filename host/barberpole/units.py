@@ -12,11 +12,13 @@ US_PER_S = 1e6
 NAMES = {"ut": "µT", "c": "°C", "s": "s", "ma": "mA", "a": "A", "v": "V", "lsb": "LSB"}
 """How a unit suffix is written for people."""
 
-FOREIGN = frozenset(
-    "gauss g mg oe nt pt mt t tesla ut µt raw counts count adc lsb mv uv v volt volts k degc deg_c f degf c "
-    "ms us ns min h s sec seconds ma ua a amp".split()
-)
-"""Suffixes that are recognised as units, right or wrong, where a column name is checked."""
+FIELD = ("gauss", "g", "mg", "oe", "pt", "nt", "ut", "µt", "mt", "t", "tesla")
+READING = ("lsb", "raw", "count", "counts", "adc")
+ELECTRIC = ("v", "mv", "uv", "a", "ma", "ua")
+TEMPERATURE = ("c", "degc", "k", "f", "degf")
+TIME = ("s", "sec", "ms", "us", "ns", "min", "h")
+SUFFIXES = frozenset(FIELD + READING + ELECTRIC + TEMPERATURE + TIME)
+"""Endings that are read as a unit, right or wrong, where a column name is checked."""
 
 
 def gauss_to_ut(field_gauss: float) -> float:
