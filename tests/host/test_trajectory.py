@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from barberpole.board import load_board
 from barberpole.errors import InputError, LimitError
 from barberpole.trajectory import axes, code_table, for_board, replay, sine, sphere, steps
