@@ -1,0 +1,157 @@
+"""The board's framed records (.bpr) as columns, with the self-calibration found among them."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from barberpole.columns import CURRENT, RESET, SET, check_names
+from barberpole.errors import InputError, must
+from barberpole.records import EVENT, FORMAT, HEADER, POINT, POINTS, RESULT, ROWS, RUN, TYPES, Frame, decode
+
+CODES = {"b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8", "f": "<f4", "d": "<f8"}
+
+
+@dataclass(frozen=True)
+class SelfcalRun:
+    """A self-calibration as the board recorded it; m points, arrays (3, m) or (m,).
+
+    unit        coil currents in trajectory units, -1 to 1
+    set_lsb, reset_lsb      averages in LSB, raw polarity
+    current_ma  read back; temp_c
+    header      id of the trajectory, current of a unit and so on; result the board's verdict, None if it never came
+    """
+
+    header: dict[str, Any]
+    index: np.ndarray
+    unit: np.ndarray
+    set_lsb: np.ndarray
+    reset_lsb: np.ndarray
+    current_ma: np.ndarray
+    temp_c: np.ndarray
+    result: dict[str, Any] | None
+
+
+@dataclass(frozen=True)
+class BoardLog:
+    """What a .bpr holds of the last power-up that says anything. `skipped` counts damaged and lost frames."""
+
+    columns: dict[str, np.ndarray]
+    meta: dict[str, Any]
+    selfcal: SelfcalRun | None
+    skipped: int
+    notes: tuple[str, ...]
+
+
+@dataclass
+class _PowerUp:
+    """The frames between one header and the next."""
+
+    header: dict[str, Any] = field(default_factory=dict)
+    of: dict[str, list[Frame]] = field(default_factory=lambda: {kind: [] for kind in TYPES})
+
+
+def read_board_log(data: bytes, where: object) -> BoardLog:
+    """Columns and self-calibration out of the bytes of a .bpr. Raises InputError if there is nothing to read."""
+    stream = decode(data)
+    notes = _damage(stream.damaged, stream.lost)
+    power_up, orphans, earlier = _last_power_up(stream.frames, where)
+    if orphans:
+        notes.append(f"{orphans} frames before the first header cannot be read and were skipped")
+    if earlier:
+        notes.append(f"{earlier} frames of earlier power-ups were left out")
+    selfcal, bad_points = _selfcal(power_up)
+    columns, bad_rows = _rows(power_up, where)
+    if bad_points + bad_rows:
+        notes.append(f"{bad_points + bad_rows} frames did not have the length that the header gives and were skipped")
+    if not columns and selfcal is not None:
+        columns = _points_as_columns(selfcal)
+        notes.append("no streamed rows: the columns hold the points of the self-calibration")
+    if not columns:
+        raise InputError(must("the board record", "one with rows or points", "neither", where))
+    meta = {**power_up.header, "polarity": "raw", "events": [f.json for f in power_up.of[EVENT]]}
+    return BoardLog(columns, meta, selfcal, stream.skipped + orphans + bad_points + bad_rows, tuple(notes))
+
+
+def _damage(damaged: int, lost: int) -> list[str]:
+    notes = []
+    if damaged:
+        notes.append(f"{damaged} damaged records were skipped")
+    if lost:
+        notes.append(f"{lost} records are missing from the sequence")
+    return notes
+
+
+def _last_power_up(frames: tuple[Frame, ...], where: object) -> tuple[_PowerUp, int, int]:
+    """The last power-up with rows or points, frames before any header, and frames of earlier power-ups."""
+    power_ups: list[_PowerUp] = []
+    orphans = 0
+    for frame in frames:
+        if frame.type == HEADER:
+            power_ups.append(_PowerUp(_checked_header(frame.json or {}, where)))
+        elif power_ups:
+            power_ups[-1].of[frame.type].append(frame)
+        else:
+            orphans += 1
+    telling = [p for p in power_ups if p.of[ROWS] or p.of[POINTS]]
+    if not telling:
+        found = "no header" if not power_ups else "neither rows nor points"
+        raise InputError(must("the board record", "framed lines: a header, then rows or points", found, where))
+    earlier = sum(len(kind) for p in telling[:-1] for kind in p.of.values())
+    return telling[-1], orphans, earlier
+
+
+def _checked_header(header: dict[str, Any], where: object) -> dict[str, Any]:
+    if header.get("format") != FORMAT:
+        raise InputError(must("the board record", f"of format {FORMAT}", f"format {header.get('format')}", where))
+    columns = header.get("columns", [])
+    for column in columns if isinstance(columns, list) else [columns]:
+        fits = isinstance(column, list) and len(column) == 3 and isinstance(column[2], int | float)
+        if not fits or column[1] not in CODES:
+            wanted = "a list of [name, struct code, scale]"
+            raise InputError(must("the board record's header columns", wanted, repr(column), where))
+    return header
+
+
+def _rows(power_up: _PowerUp, where: object) -> tuple[dict[str, np.ndarray], int]:
+    """Scaled columns, and how many frames were not a whole number of rows."""
+    layout = power_up.header.get("columns", [])
+    frames = power_up.of[ROWS]
+    if not frames:
+        return {}, 0
+    if not layout:
+        raise InputError(must("the board record's header", "one with columns", "none", where))
+    check_names([str(name) for name, _, _ in layout], where)
+    kind = np.dtype([(f"{i} {name}", CODES[code]) for i, (name, code, _) in enumerate(layout)])
+    whole = [f.payload for f in frames if f.payload and len(f.payload) % kind.itemsize == 0]
+    table = np.frombuffer(b"".join(whole), kind)
+    columns = {str(name): table[f"{i} {name}"] * float(scale) for i, (name, _, scale) in enumerate(layout)}
+    return (columns if table.size else {}), len(frames) - len(whole)
+
+
+def _selfcal(power_up: _PowerUp) -> tuple[SelfcalRun | None, int]:
+    """The coil run, and how many points had a wrong length."""
+    frames = power_up.of[POINTS]
+    whole = [f.payload for f in frames if len(f.payload) == POINT.size]
+    if not whole:
+        return None, len(frames)
+    table = np.array([POINT.unpack(payload) for payload in whole]).T
+    headers, results = power_up.of[RUN], power_up.of[RESULT]
+    run = SelfcalRun(
+        header=(headers[-1].json or {}) if headers else {},
+        index=table[0].astype(int),
+        unit=table[1:4],
+        set_lsb=table[4:7],
+        reset_lsb=table[7:10],
+        current_ma=table[10:13],
+        temp_c=table[13],
+        result=results[-1].json if results else None,
+    )
+    return run, len(frames) - len(whole)
+
+
+def _points_as_columns(run: SelfcalRun) -> dict[str, np.ndarray]:
+    columns = {}
+    for names, values in ((SET, run.set_lsb), (RESET, run.reset_lsb), (CURRENT, run.current_ma)):
+        columns.update(zip(names, values, strict=True))
+    return {**columns, "temp_c": run.temp_c}

@@ -1,0 +1,130 @@
+"""CSV and Parquet as columns of floats, and back: read fast by pyarrow, judged cell by cell only where it fails."""
+
+import csv
+import io
+import json
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pa_parquet
+
+from barberpole.columns import KNOWN, check_names
+from barberpole.errors import InputError, must
+
+Columns = dict[str, np.ndarray]
+
+NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "None"]
+THREADS_FROM = 1 << 20  # bytes; below, starting threads takes longer than reading
+_META = b"barberpole"
+
+
+def read_csv(data: bytes, where: object) -> tuple[Columns, list[str], int]:
+    """Columns of a comma-separated file with names in its first line: columns (NaN where empty), notes, rows dropped.
+
+    Raises InputError about the names, or about a cell of a known column that is no number, with its row.
+    """
+    names = _header(data, where)
+    check_names(names, where)
+    dropped: list[Any] = []
+    parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(row.number) or "skip")
+    convert = pa_csv.ConvertOptions(
+        null_values=NULLS, strings_can_be_null=True, check_utf8=False, true_values=[], false_values=[]
+    )
+    read = pa_csv.ReadOptions(skip_rows=1, column_names=names, use_threads=len(data) > THREADS_FROM)
+    try:
+        table = pa_csv.read_csv(io.BytesIO(data), read, parse, convert)
+    except pa.ArrowInvalid as error:
+        wanted = "comma-separated rows under a line of names"
+        raise InputError(must("the log", wanted, _short(error), where)) from None
+    notes = [f"{len(dropped)} rows without {len(names)} cells were dropped"] if dropped else []
+    return _floats(table, notes, where), notes, len(dropped)
+
+
+def read_parquet(data: bytes, where: object) -> tuple[Columns, list[str], dict[str, Any]]:
+    """Columns of a Parquet file, notes, and the metadata that `write_parquet` put there."""
+    try:
+        table = pa_parquet.read_table(pa.BufferReader(data))
+        meta = json.loads((table.schema.metadata or {}).get(_META, b"{}"))
+    except (ValueError, OSError) as error:
+        raise InputError(must("the log", "a Parquet file", _short(error), where)) from None
+    check_names(table.column_names, where)
+    notes: list[str] = []
+    return _floats(table, notes, where), notes, meta
+
+
+def write_csv(columns: Columns) -> bytes:
+    """The file's bytes; every float comes back exactly."""
+    sink = io.BytesIO()
+    pa_csv.write_csv(pa.table(columns), sink, pa_csv.WriteOptions(quoting_style="needed"))
+    return sink.getvalue()
+
+
+def write_parquet(columns: Columns, meta: dict[str, Any]) -> bytes:
+    """The file's bytes, with `meta` as JSON in its schema."""
+    sink = io.BytesIO()
+    table = pa.table(columns).replace_schema_metadata({_META: json.dumps(meta).encode()})
+    pa_parquet.write_table(table, sink)
+    return sink.getvalue()
+
+
+def _header(data: bytes, where: object) -> list[str]:
+    first = data.split(b"\n", 1)[0]
+    if not first.strip():
+        raise InputError(must("the log", "a line of column names and rows under it", "an empty first line", where))
+    try:
+        line = first.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(must("the log's first line", "column names in UTF-8", "other bytes", where)) from None
+    names = [name.strip() for name in next(csv.reader([line.rstrip("\r")]))]
+    if len(names) == 1 and any(mark in line for mark in ";\t"):
+        raise InputError(must("the log's columns", "separated by commas", repr(line[:40]), where))
+    if all(_number(name) is not None for name in names):
+        raise InputError(must("the log's first line", "column names such as x_lsb", repr(line[:40]), where))
+    return names
+
+
+def _floats(table: pa.Table, notes: list[str], where: object) -> Columns:
+    """float64 columns; unknown ones that hold text are left out, with a note."""
+    columns = {}
+    for name, values in zip(table.column_names, table.columns, strict=True):
+        numbers = _numbers(values)
+        if numbers is None and name in KNOWN:
+            row, cell = _first_text(values)
+            raise InputError(must(f"column {name}", "numbers", f"{cell!r} in row {row + 1}", where))
+        if numbers is None:
+            notes.append(f"column {name} holds text and was left out")
+        else:
+            columns[name] = numbers
+    return columns
+
+
+def _numbers(values: pa.ChunkedArray) -> np.ndarray | None:
+    if pa.types.is_null(values.type):
+        return np.full(len(values), np.nan)
+    if pa.types.is_integer(values.type) or pa.types.is_floating(values.type):
+        return values.cast(pa.float64(), safe=False).to_numpy().astype(np.float64)
+    cells = [_number(cell) for cell in values.to_pylist()]
+    return None if None in cells else np.array(cells, float)
+
+
+def _number(cell: Any) -> float | None:
+    """The cell as a float, NaN where empty, None where it is no number."""
+    if cell is None:
+        return float("nan")
+    try:
+        return float(cell)
+    except (TypeError, ValueError):
+        return None
+
+
+def _first_text(values: pa.ChunkedArray) -> tuple[int, str]:
+    for row, cell in enumerate(values.to_pylist()):
+        if _number(cell) is None:
+            return row, cell.decode(errors="replace") if isinstance(cell, bytes) else str(cell)
+    return 0, ""
+
+
+def _short(error: Exception) -> str:
+    return str(error).splitlines()[0][:120]

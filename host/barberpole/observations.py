@@ -1,0 +1,94 @@
+"""What a fit sees of a log: readings with the sign of SET, the conditions of each, and the reference field."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from barberpole.columns import CURRENT, FIELD, READINGS, RESET, SET
+from barberpole.effects.effect import Conditions
+from barberpole.log import Log, resets_are_raw
+from barberpole.polarity import states_are_raw
+from barberpole.sensor import Sensor
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """n readings; where a log carries both magnetisations they alternate, SET first, so n is twice its rows.
+
+    y           (3, n) LSB, RESET readings with the sign of SET
+    at          Conditions, arrays of length n
+    b_ut        (3, n) µT, the applied field where known; b_mag (n,) µT, its magnitude where only that is known
+    row         (n,) row of the log that each reading came from
+    reference   "vector", "magnitude" or "constant": what is known of the field
+    raw_polarity    RESET readings came raw and were turned here, so the bridge's own offset alternates in y
+    notes       what was decided on the way, in sentences
+    """
+
+    y: np.ndarray
+    at: Conditions
+    b_ut: np.ndarray | None
+    b_mag: np.ndarray | None
+    row: np.ndarray
+    reference: str
+    raw_polarity: bool
+    notes: tuple[str, ...] = ()
+
+
+def observations(log: Log, sensor: Sensor | None = None) -> Observations:
+    """The log as a fit sees it. `sensor` gives the easy axes; without it those of Conditions hold (thesis 5.3.2)."""
+    if log.has(*SET, *RESET):
+        y, state, raw = _pairs(log)
+        repeat = 2
+    else:
+        y, state, raw = _singles(log)
+        repeat = 1
+    at = _conditions(log, state, raw, repeat, sensor)
+    b_ut, b_mag = _repeated(log.stack(FIELD), repeat), _repeated(log.get("b_ut"), repeat)
+    notes = ("RESET readings come with reversed sign: turned",) if raw else ()
+    row = np.repeat(np.arange(log.n), repeat)
+    return Observations(y, at, b_ut, b_mag, row, _reference(b_ut, b_mag), raw, notes)
+
+
+def _pairs(log: Log) -> tuple[np.ndarray, np.ndarray, bool]:
+    """SET and RESET readings in turns: y (3, 2 n), state (2 n,), whether RESET was raw."""
+    raw = resets_are_raw(log)
+    y = np.empty((3, 2 * log.n))
+    y[:, 0::2] = [log[name] for name in SET]
+    y[:, 1::2] = [log[name] for name in RESET]
+    state = np.tile([1.0, -1.0], log.n)
+    return np.where(raw & (state < 0), -y, y), state, raw
+
+
+def _singles(log: Log) -> tuple[np.ndarray, np.ndarray, bool]:
+    """One reading a row, in the state that its column gives; 0 without one."""
+    y = np.stack([log[name] for name in READINGS])
+    state = log["state"] if log.has("state") else np.zeros(log.n)
+    flipped = state != 0
+    if not (np.any(state > 0) and np.any(state < 0)):
+        return y, state, False
+    field = log.stack(FIELD)
+    raw = states_are_raw(y[:, flipped], state[flipped], None if field is None else field[:, flipped])
+    return np.where(raw & (state < 0), -y, y), state, raw
+
+
+def _conditions(log: Log, state: np.ndarray, raw: bool, repeat: int, sensor: Sensor | None) -> Conditions:
+    return Conditions(
+        state=state,
+        t_s=_repeated(log.get("t_s"), repeat),
+        temp_c=_repeated(log.get("temp_c"), repeat),
+        i_ma=_repeated(log.stack(CURRENT), repeat),
+        load_a=_repeated(log.get("load_a"), repeat),
+        supply_v=_repeated(log.get("supply_v"), repeat),
+        easy_axis=sensor.easy_axis_index if sensor else Conditions.easy_axis,
+        raw_polarity=raw,
+    )
+
+
+def _repeated(values: np.ndarray | None, repeat: int) -> np.ndarray | None:
+    return None if values is None else np.repeat(values, repeat, axis=-1)
+
+
+def _reference(b_ut: np.ndarray | None, b_mag: np.ndarray | None) -> str:
+    if b_ut is not None:
+        return "vector"
+    return "constant" if b_mag is None else "magnitude"
