@@ -10,7 +10,7 @@ from barberpole.errors import InputError
 from barberpole.fit import observability
 from barberpole.fit.gram import Gram, heldout_rms
 from barberpole.fit.residual import Problem
-from barberpole.fit.solve import Solution, minimise
+from barberpole.fit.solve import minimise
 from barberpole.fit.start import Linear, linear_part, start_values
 from barberpole.log import Log
 from barberpole.model import Model, compose, find_effect
@@ -35,6 +35,8 @@ class Fit:
     free: np.ndarray
     converged: bool
     linear: Linear
+    setups: dict[str, Setup]
+    extra: tuple[Effect, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -59,7 +61,11 @@ class Fit:
     @property
     def condition(self) -> float:
         """Condition number of the free columns: above 30 the log's geometry hardly carries the model."""
-        return observability.condition(self.gram, self.free)
+        return self.condition_of(self.free)
+
+    def condition_of(self, columns: np.ndarray) -> float:
+        """The same for some of the columns (mask (P,))."""
+        return observability.condition(self.gram, columns)
 
     def field(self) -> np.ndarray:
         """(3, n) µT: each reading taken back through the model."""
@@ -90,18 +96,22 @@ def fit_log(log: Log, file: ModelFile, extra: Sequence[Effect] = (), tick: Calla
 
 def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect] = (), tick=None) -> Fit:
     """Fit the effects of a model file to observations. Raises InputError where the log lacks a column an effect needs."""
-    problem, linear = prepare(seen, file, extra)
-    return fit_problem(problem, linear, tick=tick)
-
-
-def prepare(seen: Observations, file: ModelFile, extra: Sequence[Effect] = ()) -> tuple[Problem, Linear]:
-    """The problem and its linear start."""
     require_columns(seen, file.effects, extra)
     seen = with_reference(seen, file)
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     linear = linear_part(seen, magnitude)
-    model = compose(file.effects, setups(seen, file, linear, extra), extra)
-    return Problem(model, seen, magnitude), linear
+    known = {find_effect(name, extra).name: setup_of(seen, linear, file.settings.get(name)) for name in file.effects}
+    model = compose(file.effects, known, extra)
+    return fit_problem(Problem(model, seen, magnitude), linear, known, tuple(extra), start_values(model, linear), tick)
+
+
+def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float]) -> Fit:
+    """The same log under the effects of `known`, from the parameters found so far and those of `start` (by name)."""
+    model = compose(tuple(known), known, fit.extra)
+    values = dict(zip(fit.model.names, fit.p, strict=True)) | start
+    p = np.array([values.get(name, first) for name, first in zip(model.names, model.first, strict=True)])
+    p = np.clip(p, *model.bounds())
+    return fit_problem(replace(fit.problem, model=model), fit.linear, known, fit.extra, p)
 
 
 def with_reference(seen: Observations, file: ModelFile) -> Observations:
@@ -110,16 +120,15 @@ def with_reference(seen: Observations, file: ModelFile) -> Observations:
     return replace(seen, at=at)
 
 
-def setups(seen: Observations, file: ModelFile, linear: Linear, extra: Sequence[Effect] = ()) -> dict[str, Setup]:
-    """What each effect may adapt its parameters to."""
-    common = Setup(
+def setup_of(seen: Observations, linear: Linear, settings: dict | None = None) -> Setup:
+    """What an effect may adapt its parameters to."""
+    return Setup(
+        settings=settings or {},
         reference=seen.reference,
         flipping=flipping(seen),
         lsb_per_ut=linear.lsb_per_ut or 1.0,
         span_ut=1.5 * linear.span_ut,
     )
-    names = {find_effect(name, extra).name for name in file.effects} | {e.name for e in extra}
-    return {name: replace(common, settings=file.settings.get(name, {})) for name in names}
 
 
 def flipping(seen: Observations) -> str:
@@ -132,17 +141,23 @@ def flipping(seen: Observations) -> str:
 
 def require_columns(seen: Observations, names: Sequence[str], extra: Sequence[Effect] = ()) -> None:
     """Raise InputError if an effect needs what the log does not have."""
-    held = {"temp_c": seen.at.temp_c, "load_a": seen.at.load_a, "t_s": seen.at.t_s, "i_ma": seen.at.i_ma}
     for name in names:
         effect = find_effect(name, extra)
-        for column in effect.requires:
-            if held.get(column) is None:
-                raise InputError(f"log must have a {column} column for effect {effect.name}; got none")
+        for column in missing_columns(seen, effect):
+            raise InputError(f"log must have a {column} column for effect {effect.name}; got none")
 
 
-def fit_problem(problem: Problem, linear: Linear, start: np.ndarray | None = None, tick=None) -> Fit:
-    """Minimise, freezing what the log cannot determine: first what is dependent, then what is undetermined."""
-    p = start_values(problem.model, linear) if start is None else start
+def missing_columns(seen: Observations, effect: Effect) -> tuple[str, ...]:
+    """Columns that an effect requires and the log lacks."""
+    at = seen.at
+    held = {"temp_c": at.temp_c, "load_a": at.load_a, "t_s": at.t_s, "i_ma": at.i_ma, "supply_v": at.supply_v}
+    return tuple(column for column in effect.requires if held.get(column) is None)
+
+
+def fit_problem(
+    problem: Problem, linear: Linear, known: dict[str, Setup], extra: tuple[Effect, ...], p: np.ndarray, tick=None
+) -> Fit:
+    """Minimise from p, freezing what the log cannot determine: first what is dependent, then what is undetermined."""
     null, free = problem.model.null, np.ones(len(p), bool)
     if problem.n * problem.residuals_per_sample <= len(p):
         raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
@@ -152,13 +167,9 @@ def fit_problem(problem: Problem, linear: Linear, start: np.ndarray | None = Non
         if np.array_equal(keep, free):
             worst = observability.undetermined(problem.model, solution.gram, free)
             if worst is None:
-                return _finish(problem, linear, solution)
+                cov = observability.covariance(solution.gram, free)
+                return Fit(problem, solution.p, cov, solution.gram, free, solution.converged, linear, known, extra)
             keep = free.copy()
             keep[worst] = False
         p = np.where(free & ~keep, null, solution.p)
         free = keep
-
-
-def _finish(problem: Problem, linear: Linear, solution: Solution) -> Fit:
-    cov = observability.covariance(solution.gram, solution.free)
-    return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear)

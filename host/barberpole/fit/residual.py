@@ -69,8 +69,10 @@ class Problem:
         """Noise across the field lengthens it on average by its variance / 2K; unmodelled, more data do not help."""
         if sigma == 0.0:
             return 0.0
-        total = sum(np.sum(solve3(slope, np.broadcast_to(e[:, None], steep.shape[:0] + (3, steep.size))) ** 2, axis=0)
-                    for e in np.eye(3))
+        total = sum(
+            np.sum(solve3(slope, np.broadcast_to(e[:, None], steep.shape[:0] + (3, steep.size))) ** 2, axis=0)
+            for e in np.eye(3)
+        )
         return sigma * sigma * (total - steep * steep) / (2.0 * known)
 
     def residual(self, p: np.ndarray) -> np.ndarray:

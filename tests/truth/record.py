@@ -1,0 +1,128 @@
+"""A recording of the independent truth, as columns of the log contract or as a CSV file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import csv
+
+from . import motion, noise
+from .world import Hidden, Scene, reading, strength_for
+
+FS_HZ = 40.0
+REST_S = 60.0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to record. hidden: effect -> raw RMS over the noise RMS. corner: of the 1/f noise, as a part of fs."""
+
+    hidden: dict[str, float]
+    rows: int = 3000
+    reference: str = "vector"  # magnitude | constant
+    form: str = "flips"  # demodulated | unflipped | pairs
+    corner: float = 0.0
+    lsb_per_ut: float = 10.0
+    noise_ut: float = 0.2
+    planar: bool = False
+    still_temperature: bool = False
+    seed: int = 0
+
+
+def scene_of(recipe: Recipe, rows: int) -> Scene:
+    """The scene a recipe asks for."""
+    rng = np.random.default_rng(recipe.seed)
+    turn = motion.planar if recipe.planar else motion.directions
+    field = 50.0 * turn(rows, rng)
+    if recipe.reference == "vector":
+        field = field * np.repeat(rng.uniform(0.6, 1.2, rows // 100 + 1), 100)[:rows]
+    temp = (
+        np.full(rows, 25.0) + 0.02 * rng.normal(size=rows)
+        if recipe.still_temperature
+        else motion.temperature(rows, rng)
+    )
+    coil = np.stack([20.0 * motion.switched(rows, 5, rng) - 10.0 for _ in range(3)])
+    factors = rng.choice([-1.0, 1.0], (20, 3)) * rng.uniform(0.6, 1.4, (20, 3))
+    factors[0] = 1.0 + 0.1 * rng.normal(size=3)  # anisotropy fields of one wafer are alike
+    return Scene(
+        field,
+        _state(recipe.form, rows),
+        temp,
+        np.arange(rows) / FS_HZ,
+        motion.switched(rows, 4, rng),
+        coil,
+        FS_HZ,
+        factors,
+        recipe.seed,
+    )
+
+
+def _state(form: str, rows: int) -> np.ndarray:
+    if form == "flips":
+        return np.where(np.arange(rows) // 25 % 2 == 0, 1.0, -1.0)
+    if form == "pairs":
+        return np.where(np.arange(rows) % 2 == 0, 1.0, -1.0)
+    return np.full(rows, 1.0 if form == "unflipped" else 0.0)
+
+
+def record(recipe: Recipe) -> dict[str, np.ndarray]:
+    """Columns of the recording."""
+    rows = 2 * recipe.rows if recipe.form == "pairs" else recipe.rows
+    scene = scene_of(recipe, rows)
+    if recipe.form == "pairs":
+        scene = _pairwise(scene)
+    strengths: Hidden = {k: strength_for(k, v * recipe.noise_ut, scene) for k, v in recipe.hidden.items()}
+    rng = np.random.default_rng(recipe.seed + 10_000_000)
+    true = reading(scene, strengths) + noise.draw(scene.n, recipe.noise_ut, recipe.corner, rng)
+    gain = recipe.lsb_per_ut * rng.uniform(0.85, 1.15, 3)
+    bias = recipe.lsb_per_ut * rng.uniform(-15, 15, 3)
+    return _columns(recipe, scene, gain[:, None] * true + bias[:, None])
+
+
+def _pairwise(scene: Scene) -> Scene:
+    """SET and RESET of one row see the same field, temperature and currents."""
+    first = np.arange(scene.n) // 2 * 2
+    return Scene(
+        scene.field_ut[:, first],
+        scene.state,
+        scene.temp_c[first],
+        scene.t_s,
+        scene.load_a[first],
+        scene.i_ma[:, first],
+        scene.fs_hz,
+        scene.factors,
+        scene.noise_seed,
+    )
+
+
+def _columns(recipe: Recipe, scene: Scene, y: np.ndarray) -> dict[str, np.ndarray]:
+    every = slice(None, None, 2) if recipe.form == "pairs" else slice(None)
+    out = {"t_s": scene.t_s[every]}
+    for i, a in enumerate("xyz"):
+        if recipe.form == "pairs":
+            out[f"{a}_set_lsb"], out[f"{a}_reset_lsb"] = y[i, ::2], -y[i, 1::2]
+        else:
+            out[f"{a}_lsb"] = y[i]
+    if recipe.form in ("flips", "demodulated"):
+        out["state"] = scene.state
+    if recipe.reference == "vector":
+        out |= {f"b{a}_ut": scene.field_ut[i, every] for i, a in enumerate("xyz")}
+    if recipe.reference == "magnitude":
+        out["b_ut"] = np.linalg.norm(scene.field_ut, axis=0)[every]
+    out |= {"temp_c": scene.temp_c[every], "load_a": scene.load_a[every]}
+    return out | {f"i{a}_ma": scene.i_ma[i, every] for i, a in enumerate("xyz")}
+
+
+def rest(recipe: Recipe) -> dict[str, np.ndarray]:
+    """60 s of the same sensor lying still."""
+    n = int(REST_S * FS_HZ)
+    rng = np.random.default_rng(recipe.seed + 20_000_000)
+    y = recipe.lsb_per_ut * (noise.draw(n, recipe.noise_ut, recipe.corner, rng) + np.array([[20.0], [-10.0], [40.0]]))
+    return {"t_s": np.arange(n) / FS_HZ} | {f"{a}_lsb": y[i] for i, a in enumerate("xyz")}
+
+
+def write(columns: dict[str, np.ndarray], path: Path) -> Path:
+    """The columns as CSV."""
+    csv.write_csv(pa.table(columns), path)
+    return path
