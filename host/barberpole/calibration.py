@@ -4,12 +4,13 @@ A calibration is a TOML file, and every number comes back from it exactly. Its h
 coils' factory response; the board carries it, so that a log says which calibration compensated it.
 """
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomlkit
+from tomlkit.items import Table
 
 from barberpole.calibration_tables import (
     CalibrationTables,
@@ -57,7 +58,7 @@ class Calibration:
     log_name: str
     log_sha256: str
     unobservable: tuple[str, ...] = ()
-    validity: Validity = Validity()
+    validity: Validity = field(default_factory=Validity)
     history: tuple[Step, ...] = ()
     selfcal: SelfcalReference | None = None
     easy_axis: tuple[int, int, int] = (1, 0, 1)
@@ -157,7 +158,7 @@ def _parameters(parameters: dict[str, Value]) -> dict[str, Any]:
     return tables
 
 
-def _covariance(calibration: Calibration) -> tomlkit.items.Table:
+def _covariance(calibration: Calibration) -> Table:
     table = tomlkit.table()
     table.add(tomlkit.comment("rows and columns in the order of the parameters above"))
     matrix = tomlkit.array()

@@ -26,6 +26,7 @@ from barberpole.files import read_text, write_atomic
 from barberpole.tables import STRICT, Number, Positive, read_toml, unknown, validate
 
 HASH_DIGITS = 12
+KEYS = ("effects", "plugins", "sensor", "reference")
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -128,10 +129,8 @@ def _from_file(path: Path) -> ModelFile:
     names = tables.get("effects", [])
     settings = {name: tables.pop(name) for name in list(tables) if name in names and isinstance(tables[name], dict)}
     for name in tables:
-        if name not in ("effects", "plugins", "sensor", "reference"):
-            raise InputError(
-                unknown(name, ["effects", "plugins", "sensor", "reference", *names], "the model file", path)
-            )
+        if name not in KEYS:
+            raise InputError(unknown(name, [*KEYS, *names], "the model file", path))
     head = validate(_Head, tables, "the model file", path)
     if not head.effects:
         raise InputError(must("effects", "a list of at least one effect", "an empty list", path))

@@ -88,8 +88,8 @@ def _sentence(kind: type, fault: Any, what: str, where: object, prefix: str) -> 
     while len(path) > 1 and (inner := table_of(table, str(path[0]))):
         start = f"{path.pop(0)}." if table is kind else f"{start}{path.pop(0)}."
         table = inner
-    key, item = str(path[0]), f"[{path[1]}]" if len(path) > 1 else ""
-    if fault["type"] in _UNKNOWN:
+    key, item = str(path[0]), "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path[1:])
+    if fault["type"] in _UNKNOWN and not item:
         return unknown(key, [f.name for f in dataclasses.fields(table)], what, where, start)
     if fault["type"] in _MISSING and table_of(table, key):
         return must(what, f"one with a table [{key}]", "none", where)
