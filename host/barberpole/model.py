@@ -1,18 +1,25 @@
 """The chosen effects as one model: field -> reading (predict), its derivatives, and back (undo, invert).
 
 n samples, P parameters in stack order. Fields are (3, n) in µT, readings (3, n) in LSB.
+A demodulated reading is the mean of what SET and RESET would report: the stages before the first effect that tells
+the two apart (the `head`) are run once, the `rest` once for each.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from barberpole.effects import ALIASES, STACK, Conditions, Effect, Param, Setup
-from barberpole.errors import InputError
+from barberpole.chain import UNIT, add_columns, full, solve3, sum_slopes, through
+from barberpole.effects import Conditions, Effect, Param, Setup, find_effect, in_order
+from barberpole.errors import InputError, must
 
 Array = np.ndarray
+Numbers = Any  # the parameter vector (P,)
+NEWTON_STEPS = 12
+CONVERGED = 1e-6  # relative step after which the next, being quadratic, would be below rounding
 
 
 @dataclass(frozen=True)
@@ -22,6 +29,15 @@ class Term:
     effect: Effect
     params: tuple[Param, ...]
     at: slice
+
+
+class Stage(NamedTuple):
+    """One term at work: what went in and its slopes."""
+
+    term: Term
+    xyz: Array
+    d_in: Array | None
+    d_p: Array
 
 
 @dataclass(frozen=True)
@@ -49,6 +65,31 @@ class Model:
         """Whether any effect tells SET from RESET."""
         return any(term.effect.flips for term in self.terms)
 
+    @cached_property
+    def memory(self) -> bool:
+        """Whether any effect needs whole time series, which must then not be cut into pieces."""
+        return any(term.effect.memory for term in self.terms)
+
+    @cached_property
+    def loss(self) -> str | None:
+        """How residuals are to be weighed; None: least squares."""
+        return next((term.effect.loss for term in self.terms if term.effect.loss), None)
+
+    @cached_property
+    def still(self) -> "Model":
+        """The same, with the same parameter vector, as if the field of other samples did not matter."""
+        return replace(self, terms=tuple(t for t in self.terms if t.effect.tangent is None))
+
+    @cached_property
+    def head(self) -> tuple[Term, ...]:
+        """The terms before the first that tells SET from RESET; none if a later one mixes samples."""
+        first = next((i for i, t in enumerate(self.terms) if t.effect.flips), len(self.terms))
+        return () if any(t.effect.tangent for t in self.terms[first:]) else self.terms[:first]
+
+    @cached_property
+    def rest(self) -> tuple[Term, ...]:
+        return self.terms[len(self.head) :]
+
     @property
     def null(self) -> Array:
         return np.array([p.null for p in self.params])
@@ -63,124 +104,138 @@ class Model:
     def states(self, at: Conditions) -> list[tuple[float, Conditions]]:
         """The magnetisations to evaluate, with their weights: a demodulated reading is the mean of SET and RESET."""
         state = np.asarray(at.state, float)
-        if self.unflipped:
-            return [(1.0, replace(at, state=np.where(state == 0, 1.0, state)))]
-        if not self.flips or np.all(state != 0):
+        if np.all(state != 0) or not self.rest:
             return [(1.0, at)]
-        return [(0.5, replace(at, state=np.where(state == 0, s, state))) for s in (1.0, -1.0)]
+        signs = ((1.0, 1.0),) if self.unflipped else ((0.5, 1.0), (0.5, -1.0))
+        if np.any(state != 0):
+            return [(weight, replace(at, state=np.where(state == 0, sign, state))) for weight, sign in signs]
+        return [(weight, replace(at, state=sign)) for weight, sign in signs]
 
-    def predict(self, field_ut: Array, p: Sequence[float], at: Conditions) -> Array:
+    def predict(self, field_ut: Array, p: Numbers, at: Conditions) -> Array:
         """Readings (3, n) in LSB for a field (3, n) in µT."""
-        total = 0.0
+        field_ut = _run(self.head, field_ut, p, at)
+        return np.asarray(sum(weight * _run(self.rest, field_ut, p, one) for weight, one in self.states(at)))
+
+    def linearise(
+        self, field_ut: Array, p: Numbers, at: Conditions, field_too: bool = False
+    ) -> tuple[Array, Array, Array | None]:
+        """Readings (3, n), d reading / d p (3, P, n) and, if asked, d reading / d field (3, 3, n).
+
+        The last is that by the field of the same sample, other samples' fields held.
+        """
+        columns = np.zeros((3, len(p), field_ut.shape[1]))
+        head, field_ut = _follow(self.head, field_ut, p, at)
+        y, slope = self._rest_slope(field_ut, p, at, columns)
+        slope = _pull(head, slope, columns, at, p, field_too)
+        return y, columns, full(slope, y.shape[1]) if field_too else None
+
+    def _rest_slope(self, field_ut, p, at, columns=None) -> tuple[Array, Array]:
+        """Readings and d reading / d field of the stages after the head; the parameters' columns are added up."""
+        y: Array = np.zeros(np.shape(field_ut))
+        slope: Array = np.zeros((3, 1))
         for weight, one in self.states(at):
-            xyz = field_ut
-            for term in self.terms:
-                xyz = term.effect.forward(xyz, p[term.at], one)
-            total = total + weight * np.asarray(xyz)
-        return np.asarray(total)
+            stages, out = _follow(self.rest, field_ut, p, one)
+            y += weight * out
+            slope = sum_slopes(slope, _pull(stages, weight * UNIT, columns, one, p, True))
+        return y, slope
 
-    def linearise(self, field_ut: Array, p: Array, at: Conditions, field_too: bool = False) -> tuple[Array, Array, Array | None]:
-        """Readings (3, n), d reading / d p (3, P, n) and, if asked, d reading / d field (3, 3, n)."""
-        y, d_p, d_b = np.zeros(1), np.zeros(1), None
-        for weight, one in self.states(at):
-            y_s, p_s, b_s = self._linearise(field_ut, p, one, field_too)
-            y, d_p = y + weight * y_s, d_p + weight * p_s
-            if b_s is not None:
-                d_b = weight * b_s if d_b is None else d_b + weight * b_s
-        return y, d_p, d_b
-
-    def _linearise(self, field_ut, p, at, field_too):
-        n = field_ut.shape[1]
-        offset = 3 if field_too else 0
-        chain = np.zeros((3, offset + len(p), n))  # derivative of the current stage by field and parameters so far
-        if field_too:
-            chain[:, :3] = np.eye(3)[:, :, None]
-        xyz = field_ut
-        for term in self.terms:
-            d_in, d_p = term.effect.derivatives(xyz, p[term.at], at)
-            done = offset + term.at.start
-            if d_in is not None and done:
-                chain[:, :done] = push(d_in, chain[:, :done])
-            chain[:, done : done + d_p.shape[1]] = d_p
-            xyz = np.asarray(term.effect.forward(xyz, p[term.at], at))
-        return xyz, chain[:, offset:], chain[:, :3] if field_too else None
-
-    def undo(self, xyz, p: Sequence[float], at: Conditions):
+    def undo(self, xyz, p: Numbers, at: Conditions):
         """Field of one magnetisation's readings (state +1 or -1), by each effect's own inverse, last to first.
 
-        Plain arithmetic throughout: runs on arrays and on the firmware generator's symbols.
+        Plain arithmetic throughout: runs on arrays and on the firmware generator's symbols. The field of the offset
+        coils, `at.coil_ut`, is not part of the result.
         """
-        for term in reversed(self.terms):
-            undo = term.effect.undo
-            if undo is None:
-                raise InputError(f"effect {term.effect.name} must have an undo to be compensated; it gives forward only")
-            xyz = undo(xyz, p[term.at], at)
-        return xyz
+        return _undo(self.terms, xyz, p, at)
 
-    def undo_pair(self, set_xyz, reset_xyz, p: Sequence[float], at: Conditions):
+    def undo_pair(self, set_xyz, reset_xyz, p: Numbers, at: Conditions):
         """Field from a SET and a RESET reading (both with the sign of SET): each undone in its own state, averaged."""
         if not self.flips:
             mean = tuple(0.5 * (a + b) for a, b in zip(set_xyz, reset_xyz, strict=True))
             return self.undo(mean, p, replace(at, state=0.0))
-        after_set = self.undo(set_xyz, p, replace(at, state=1.0))
-        after_reset = self.undo(reset_xyz, p, replace(at, state=-1.0))
-        return tuple(0.5 * (a + b) for a, b in zip(after_set, after_reset, strict=True))
+        after_set = _undo(self.rest, set_xyz, p, replace(at, state=1.0))
+        after_reset = _undo(self.rest, reset_xyz, p, replace(at, state=-1.0))
+        mean = tuple(0.5 * (a + b) for a, b in zip(after_set, after_reset, strict=True))
+        return _undo(self.head, mean, p, replace(at, state=0.0))
 
-    def invert(self, reading: Array, p: Array, at: Conditions, steps: int = 12, tolerance: float = 1e-12) -> Array:
-        """Field (3, n) behind the readings, by Newton on `predict`: works for every state and every effect."""
-        field = self._linear_guess(reading, p, at)
-        for _ in range(steps):
-            y, _, slope = self.linearise(field, p, at, field_too=True)
-            step = solve3(slope, reading - y)
-            field = field + step
-            if np.max(np.abs(step), initial=0.0) <= tolerance * max(np.max(np.abs(field), initial=0.0), 1e-300):
+    def invert(self, reading: Array, p: Numbers, at: Conditions) -> Array:
+        """Field (3, n) behind the readings, for every state and every effect; NaN where none can be.
+
+        The readings of one magnetisation are undone stage by stage; a demodulated reading takes Newton's method on
+        the stages that tell SET from RESET.
+        """
+        with np.errstate(all="ignore"):
+            states = self.states(at)
+            found = np.asarray(sum(w * np.asarray(_undo(self.rest, reading, p, one)) for w, one in states))
+            if len(states) > 1:
+                found = self._newton(found, reading, p, at)
+            return np.asarray(_undo(self.head, found, p, at))
+
+    def _newton(self, found, reading, p, at):
+        for _ in range(NEWTON_STEPS):
+            y, slope = self._rest_slope(found, p, at)
+            step = solve3(full(slope, y.shape[1]), reading - y)
+            found = found + step
+            if not np.nanmax(np.abs(step), initial=0.0) > CONVERGED * np.nanmax(np.abs(found), initial=0.0):
                 break
-        return field
-
-    def _linear_guess(self, reading, p, at):
-        zero = np.zeros((3, 1))
-        one = at.take(slice(0, 1))
-        y, _, slope = self.linearise(zero, p, one, field_too=True)
-        return np.linalg.solve(slope[:, :, 0], reading - y)
+        return found
 
 
-def push(d_in: Array, chain: Array) -> Array:
-    """Carry derivatives (3, K, n) through a stage with d out / d in of shape (3, n) (diagonal) or (3, 3, n)."""
-    if d_in.ndim == 2:
-        return d_in[:, None, :] * chain
-    return np.einsum("ijn,jkn->ikn", d_in, chain)
+def _run(terms, xyz, p, at):
+    for term in terms:
+        xyz = np.asarray(term.effect.forward(xyz, p[term.at], at))
+    return xyz
 
 
-def solve3(matrix: Array, right: Array) -> Array:
-    """x of matrix x = right for n systems at once: (3, 3, n), (3, n) -> (3, n). Cramer's rule, no copies per sample."""
-    a, b, c = matrix[:, 0], matrix[:, 1], matrix[:, 2]
-    bc, ca, ab = np.cross(b, c, axis=0), np.cross(c, a, axis=0), np.cross(a, b, axis=0)
-    det = np.sum(a * bc, axis=0)
-    return np.stack([np.sum(right * v, axis=0) for v in (bc, ca, ab)]) / det
+def _follow(terms, xyz, p, at) -> tuple[list[Stage], Array]:
+    """The stages that a field goes through, and what comes out."""
+    stages = []
+    for term in terms:
+        out, d_in, d_p = term.effect.linearise(xyz, p[term.at], at)
+        stages.append(Stage(term, xyz, d_in, d_p))
+        xyz = out
+    return stages, np.asarray(xyz)
 
 
-def find_effect(name: str, extra: Sequence[Effect] = ()) -> Effect:
-    """The effect of that name or alias. Raises InputError with the known names."""
-    known = {e.name: e for e in (*STACK, *extra)}
-    wanted = ALIASES.get(name, name)
-    if wanted not in known:
-        raise InputError(f"effect must be one of {', '.join(known)}; got {name!r}")
-    return known[wanted]
+def _pull(stages: list[Stage], tail: Array, columns: Array | None, at, p, slope_too: bool) -> Array:
+    """Add each parameter's column to `columns` (3, P, n), from d reading / d out of the last stage backwards.
+
+    Returns d reading / d in of the first stage, if asked.
+    """
+    for i in range(len(stages) - 1, -1, -1):
+        term, xyz, d_in, d_p = stages[i]
+        if columns is not None:
+            add_columns(columns[:, term.at], tail, d_p)
+            if term.effect.tangent and term.at.start:
+                # what comes before reaches the reading through other samples too: bring it here, then carry it on
+                before = np.zeros((3, term.at.start, xyz.shape[1]))
+                _pull(stages[:i], UNIT, before, at, p, False)
+                add_columns(columns[:, : term.at.start], tail, term.effect.tangent(xyz, p[term.at], at, before))
+                columns = None
+        if i or slope_too:
+            tail = through(tail, d_in)
+    return tail
+
+
+def _undo(terms, xyz, p, at):
+    for term in reversed(terms):
+        effect = term.effect
+        if effect.undo is None:
+            raise InputError(f"effect {effect.name} must have an undo to be compensated; it gives forward only")
+        if effect.off_board and not isinstance(xyz[0], (np.ndarray, float, int)):
+            raise InputError(must(f"effect {effect.name}", "left out of a model for the board", effect.off_board))
+        xyz = effect.undo(xyz, p[term.at], at)
+    return xyz
 
 
 def compose(names: Sequence[str], setups: dict[str, Setup] | Setup, extra: Sequence[Effect] = ()) -> Model:
     """The model of these effects, in physical order whatever the order of the names."""
-    order = [e.name for e in (*STACK, *extra)]
+    order = in_order(extra)
     chosen = {find_effect(name, extra).name: find_effect(name, extra) for name in names}
     terms, start = [], 0
-    for effect in sorted(chosen.values(), key=lambda e: order.index(e.name)):
+    for effect in sorted(chosen.values(), key=order.index):
         setup = setups if isinstance(setups, Setup) else setups[effect.name]
         params = effect.params(setup)
         terms.append(Term(effect, params, slice(start, start + len(params))))
         start += len(params)
-    unflipped = any(not isinstance(setups, Setup) and s.settings.get("form") == "unflipped" for s in _values(setups))
-    return Model(tuple(terms), unflipped)
-
-
-def _values(setups):
-    return () if isinstance(setups, Setup) else setups.values()
+    every = (setups,) if isinstance(setups, Setup) else setups.values()
+    return Model(tuple(terms), any(s.settings.get("form") == "unflipped" for s in every))

@@ -1,13 +1,16 @@
 """The physical effects. STACK lists them in physical order, from the field to the reading: the only registry."""
 
+from collections.abc import Sequence
+
 from barberpole.effects.bias import BIAS
 from barberpole.effects.bias_temperature import BIAS_TEMPERATURE
 from barberpole.effects.cross_field import CROSS_FIELD
-from barberpole.effects.effect import Conditions, Effect, Param, Setup
+from barberpole.effects.effect import Conditions, Effect, Param, Setup, Shape
 from barberpole.effects.flip_asymmetry import FLIP_ASYMMETRY
 from barberpole.effects.misalignment import MISALIGNMENT
 from barberpole.effects.scale import SCALE
 from barberpole.effects.sensitivity_temperature import SENSITIVITY_TEMPERATURE
+from barberpole.errors import InputError, must
 
 STACK: tuple[Effect, ...] = (
     MISALIGNMENT,
@@ -20,4 +23,22 @@ STACK: tuple[Effect, ...] = (
 )
 ALIASES = {"hard_iron": "bias"}  # nothing in a log separates the two: the field of a magnet, seen through the gain
 
-__all__ = ["ALIASES", "STACK", "Conditions", "Effect", "Param", "Setup"]
+
+def find_effect(name: str, extra: Sequence[Effect] = ()) -> Effect:
+    """The effect of that name or alias. Raises InputError with the known names."""
+    known = {e.name: e for e in (*STACK, *extra)}
+    wanted = ALIASES.get(name, name)
+    if wanted not in known:
+        raise InputError(must("effect", f"one of {', '.join(known)}", repr(name)))
+    return known[wanted]
+
+
+def in_order(extra: Sequence[Effect] = ()) -> tuple[Effect, ...]:
+    """STACK with a user's effects in their place: those on the field before the bridge, those on readings last."""
+    bridge = STACK.index(CROSS_FIELD)
+    field = tuple(e for e in extra if e.stage == "field")
+    reading = tuple(e for e in extra if e.stage != "field")
+    return (*STACK[:bridge], *field, *STACK[bridge:], *reading)
+
+
+__all__ = ["ALIASES", "STACK", "Conditions", "Effect", "Param", "Setup", "Shape", "find_effect", "in_order"]

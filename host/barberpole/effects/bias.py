@@ -16,7 +16,8 @@ from barberpole.effects.effect import Conditions, Effect, Setup, per_axis
 def params(setup: Setup):
     """b in LSB, and o in LSB where raw SET and RESET readings are both there."""
     field_like = per_axis("LSB", typical=10.0 * setup.lsb_per_ut)
-    return field_like + (per_axis("LSB", prefix="bridge_", typical=10.0 * setup.lsb_per_ut) if setup.flipping == "raw" else ())
+    bridge = per_axis("LSB", prefix="bridge_", typical=10.0 * setup.lsb_per_ut)
+    return field_like + bridge if setup.flipping == "raw" else field_like
 
 
 def offsets(p, at: Conditions):
@@ -39,14 +40,20 @@ def undo(xyz, p, at: Conditions):
 
 
 def jacobian(xyz, p, at: Conditions):
-    """Derivatives of (1)."""
-    n = np.shape(xyz)[1]
-    d_p = np.zeros((3, len(p), n))
-    for axis in range(3):
-        d_p[axis, axis] = 1.0
-        if len(p) == 6:
-            d_p[axis, 3 + axis] = at.state
-    return None, d_p
+    """Slopes of (1)."""
+    if len(p) == 3:
+        return None, np.ones((3, 1))
+    alternating = np.atleast_1d(np.asarray(at.state, float))
+    return None, np.stack([np.ones_like(alternating)] * 3 + [alternating] * 3)
 
 
-BIAS = Effect("bias", "y_i = x_i + b_i + s o_i", "thesis 4.4, 4.7, 3.37-3.43", params, forward, undo, jacobian)
+BIAS = Effect(
+    "bias",
+    "y_i = x_i + b_i + s o_i",
+    "thesis 4.4, 4.7, 3.37-3.43",
+    params,
+    forward,
+    undo,
+    jacobian,
+    summary="a constant is added to each axis: hard iron, or the offset of bridge and amplifier",
+)

@@ -9,13 +9,14 @@ the log's readings were already brought to one sign. Without both states in the 
 
 import numpy as np
 
-from barberpole.effects.effect import Conditions, Effect, Setup, diagonal, per_axis
+from barberpole.effects.effect import Conditions, Effect, Setup, per_axis
 
 
 def params(setup: Setup):
     """d (dimensionless) and, for corrected readings, o in LSB."""
     gain = per_axis("1", prefix="gain_", lower=-0.5, upper=0.5, typical=0.01)
-    return gain + (per_axis("LSB", prefix="offset_", typical=setup.lsb_per_ut) if setup.flipping == "corrected" else ())
+    offset = per_axis("LSB", prefix="offset_", typical=setup.lsb_per_ut)
+    return gain + offset if setup.flipping == "corrected" else gain
 
 
 def forward(xyz, p, at: Conditions):
@@ -32,16 +33,22 @@ def undo(xyz, p, at: Conditions):
 
 
 def jacobian(xyz, p, at: Conditions):
-    """Derivatives of (1)."""
-    x = np.asarray(xyz)
-    s = np.broadcast_to(np.asarray(at.state, float), x.shape[1:])
-    d_p = np.zeros((3, len(p), x.shape[1]))
-    d_p[:, :3] = diagonal(s * x)
+    """Slopes of (1)."""
+    x, s = np.asarray(xyz), np.asarray(at.state, float)
+    d_p = s * x
     if len(p) == 6:
-        d_p[:, 3:] = diagonal(np.broadcast_to(s, x.shape))
+        d_p = np.concatenate([d_p, np.broadcast_to(s, x.shape)])
     return 1.0 + s * np.asarray(p, float)[:3, None], d_p
 
 
 FLIP_ASYMMETRY = Effect(
-    "flip_asymmetry", "y_i = (1 + s d_i) x_i + s o_i", "thesis 3.37-3.39, 3.4", params, forward, undo, jacobian, flips=True
+    "flip_asymmetry",
+    "y_i = (1 + s d_i) x_i + s o_i",
+    "thesis 3.37-3.39, 3.4",
+    params,
+    forward,
+    undo,
+    jacobian,
+    flips=True,
+    summary="SET and RESET leave different sensitivities, or offsets, behind",
 )

@@ -13,6 +13,7 @@ from barberpole.effects.effect import Conditions, Effect, Param, Setup
 
 UPPER = ("xy", "xz", "yz")
 LOWER = ("yx", "zx", "zy")
+PLACES = tuple(("xyz".index(i), "xyz".index(j)) for i, j in UPPER + LOWER)
 _ANGLE = {"unit": "rad", "typical": 0.02, "lower": -20.0, "upper": 20.0}
 
 
@@ -24,8 +25,8 @@ def params(setup: Setup):
 def matrix(p):
     """The rows of (1), 3 x 3, unit norm."""
     rows = np.eye(3, dtype=np.result_type(np.asarray(p), float))
-    for name, value in zip(UPPER + LOWER, p, strict=False):
-        rows["xyz".index(name[0]), "xyz".index(name[1])] = value
+    for (i, j), value in zip(PLACES, p, strict=False):
+        rows[i, j] = value
     return rows / np.sqrt(np.sum(rows * rows, axis=1))[:, None]
 
 
@@ -40,17 +41,29 @@ def undo(xyz, p, at: Conditions):
     return tuple(float(a) * x + float(b) * y + float(c) * z for a, b, c in np.linalg.inv(matrix(p)))
 
 
-def jacobian(xyz, p, at: Conditions):
-    """Derivatives of (1)."""
+def joint(xyz, p, at: Conditions):
+    """(1) and its slopes."""
     unit, field = matrix(p), np.asarray(xyz)
     out = unit @ field
     d_p = np.zeros((3, len(p), field.shape[1]))
-    for column, name in enumerate((UPPER + LOWER)[: len(p)]):
-        i, j = "xyz".index(name[0]), "xyz".index(name[1])
+    for column, (i, j) in enumerate(PLACES[: len(p)]):
         d_p[i, column] = unit[i, i] * (field[j] - unit[i, j] * out[i])  # d (row / |row|) / d e_ij
-    return np.repeat(unit[:, :, None], field.shape[1], axis=2), d_p
+    return out, unit[:, :, None], d_p
+
+
+def jacobian(xyz, p, at: Conditions):
+    """Slopes of (1)."""
+    return joint(xyz, p, at)[1:]
 
 
 MISALIGNMENT = Effect(
-    "misalignment", "h_i = (B_i + sum e_ij B_j) / norm", "thesis 4.2, 4.15-4.18; article 2.2.1", params, forward, undo, jacobian
+    "misalignment",
+    "h_i = (B_i + sum e_ij B_j) / norm",
+    "thesis 4.2, 4.15-4.18; article 2.2.1",
+    params,
+    forward,
+    undo,
+    jacobian,
+    joint=joint,
+    summary="the sensitive axes are not at right angles, or not along the axes of the reference",
 )

@@ -8,7 +8,7 @@ S in LSB/µT; g is today's gain over the calibrated one, measured through the of
 
 import numpy as np
 
-from barberpole.effects.effect import Conditions, Effect, Setup, diagonal, per_axis
+from barberpole.effects.effect import Conditions, Effect, Setup, per_axis
 
 
 def params(setup: Setup):
@@ -27,9 +27,18 @@ def undo(xyz, p, at: Conditions):
 
 
 def jacobian(xyz, p, at: Conditions):
-    """Derivatives of (1)."""
-    g = np.asarray(at.gain, float)[:, None]
-    return np.broadcast_to(np.asarray(p, float)[:, None] * g, np.shape(xyz)), diagonal(g * np.asarray(xyz))
+    """Slopes of (1)."""
+    gain = np.asarray(at.gain, float)[:, None]
+    return np.asarray(p, float)[:, None] * gain, gain * np.asarray(xyz)
 
 
-SCALE = Effect("scale", "y_i = S_i h_i", "thesis 4.1, 6.7", params, forward, undo, jacobian)
+SCALE = Effect(
+    "scale",
+    "y_i = S_i h_i",
+    "thesis 4.1, 6.7",
+    params,
+    forward,
+    undo,
+    jacobian,
+    summary="each axis has its own sensitivity",
+)
