@@ -1,0 +1,1 @@
+"""Published and closed-form methods, each with its equation numbers."""

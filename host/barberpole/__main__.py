@@ -1,0 +1,3 @@
+from barberpole.cli import main
+
+main()

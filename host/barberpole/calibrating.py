@@ -1,0 +1,93 @@
+"""A fit becomes a calibration: numbers with standard errors, where they hold, and the coils' factory response."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from barberpole.adding import noise_from_differences
+from barberpole.board_log import SelfcalRun
+from barberpole.calibration import Calibration
+from barberpole.calibration_tables import Residual, SelfcalReference, Step, Validity, Value
+from barberpole.fit.fit import Fit
+from barberpole.fitted import from_calibration
+from barberpole.log import Log
+from barberpole.modelfile import ModelFile
+from barberpole.sensor import Sensor
+
+
+def calibration_of(
+    fit: Fit, log: Log, file: ModelFile, method: str = "fit", history: Sequence[Step] = ()
+) -> Calibration:
+    """What was fitted, as it is written to calibration.toml."""
+    free = fit.free
+    params = zip(fit.model.names, fit.model.params, fit.p, fit.stderr, free, strict=True)
+    return Calibration(
+        model=file,
+        parameters={n: Value(float(v), float(s), q.unit) for n, q, v, s, kept in params if kept},
+        covariance=fit.covariance[np.ix_(free, free)],
+        residual=residual_of(fit),
+        log_name=log.path.name,
+        log_sha256=log.sha256,
+        unobservable=fit.unobservable,
+        validity=validity_of(fit),
+        history=tuple(history),
+        easy_axis=fit.problem.seen.at.easy_axis,
+        t0_c=fit.problem.seen.at.t0_c,
+        method=method,
+    )
+
+
+def residual_of(fit: Fit) -> Residual:
+    """How well the fit does."""
+    residual = fit.problem.residual(fit.p)
+    return Residual(
+        n=fit.problem.n,
+        rms_lsb=fit.rms_lsb,
+        rms_ut=fit.rms_ut(),
+        noise_lsb=noise_from_differences(residual),
+        heldout_rms_lsb=fit.heldout_rms_lsb,
+        rms_norm_percent=fit.rms_norm_percent(),
+    )
+
+
+def validity_of(fit: Fit) -> Validity:
+    """The range of fields and temperatures in the log."""
+    seen = fit.problem.seen
+    field = seen.b_ut if seen.b_ut is not None else fit.field()
+    temp = seen.at.temp_c
+    return Validity(
+        field_min_ut=_triple(field.min(axis=1)),
+        field_max_ut=_triple(field.max(axis=1)),
+        b_max_ut=float(np.max(np.linalg.norm(field, axis=0))),
+        temp_min_c=None if temp is None else float(np.min(temp)),
+        temp_max_c=None if temp is None else float(np.max(temp)),
+    )
+
+
+def with_selfcal(calibration: Calibration, run: SelfcalRun, sensor: Sensor) -> Calibration:
+    """The calibration with a coil run of the same day as the reference for later power-ups (thesis 6.7).
+
+    Raises InputError when the run does not carry what a reference needs.
+    """
+    from barberpole.selfcal import factory_reference  # here: selfcal stands on fitted models, as this module does
+
+    found = factory_reference(run, from_calibration(calibration), sensor.offset_coil_ut_per_ma)
+    reference = SelfcalReference(
+        gain_ut_per_unit=_matrix(found["gain_ut_per_unit"]),
+        units_ma=_triple(found["units_ma"]),
+        trajectory=str(found["trajectory"]),
+        offset_lsb=_triple(found["offset_lsb"]),
+        temp_c=float(found["temp_c"]),
+    )
+    return replace(calibration, selfcal=reference)
+
+
+def _triple(values) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
+
+def _matrix(rows) -> tuple[tuple[float, float, float], ...]:
+    x, y, z = (_triple(row) for row in rows)
+    return x, y, z

@@ -1,0 +1,59 @@
+"""The command line: exit 0 done, 1 the answer is "no", 2 bad input with one clear sentence on stderr."""
+
+import sys
+
+import typer
+
+from barberpole import __version__
+from barberpole.commands import board, calibrate, demo
+from barberpole.errors import BarberpoleError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+app = typer.Typer(
+    help="Calibrate AMR magnetometers: fit, find the missing effect, build the firmware, check the board.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+calibrate.register(app)
+board.register(app)
+demo.register(app)
+
+
+@app.callback(invoke_without_command=True)
+def _top(
+    context: typer.Context,
+    version: bool = typer.Option(False, "--version", help="Print the version and stop."),
+) -> None:
+    if version:
+        print(__version__)
+        raise typer.Exit
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run one command and exit with its code."""
+    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; its exit code. Errors that a user can mend become one line on stderr."""
+    try:
+        code = app(args=arguments, prog_name="barberpole", standalone_mode=False)
+    except typer.Exit as leave:
+        return leave.exit_code
+    except typer.TyperException as usage:
+        return _refuse(usage.format_message())
+    except BarberpoleError as error:
+        return _refuse(str(error))
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except BrokenPipeError:
+        return 0
+    return code if isinstance(code, int) else 0
+
+
+def _refuse(sentence: str) -> int:
+    print(f"barberpole: {' '.join(sentence.split())}", file=sys.stderr)
+    return BAD_INPUT

@@ -1,0 +1,208 @@
+"""fit, compare, diagnose, add, remove, verify, convert, effects: what is done with a log and a model."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from barberpole.adding import Change, change
+from barberpole.board import load_sensor
+from barberpole.calibrating import calibration_of, with_selfcal
+from barberpole.calibration import Calibration, read_calibration, write_calibration
+from barberpole.calibration_tables import Step
+from barberpole.commands import show
+from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
+from barberpole.diagnose import compare as compare_fit
+from barberpole.diagnose import diagnose as diagnose_log
+from barberpole.effects import STACK, Effect
+from barberpole.errors import BarberpoleError, InputError, must
+from barberpole.fit.fit import Fit, fit_observations
+from barberpole.log import Log, read_log, write_log
+from barberpole.methods.registry import find_method
+from barberpole.modelfile import ModelFile, add_effect, read_model, remove_effect, write_model
+from barberpole.observations import Observations, observations
+from barberpole.plugins import load_plugins
+from barberpole.sensor import Sensor
+from barberpole.verify import verify as verify_log
+
+LogPath = Annotated[Path, typer.Argument(help="CSV, Parquet or board records (.bpr).")]
+ModelOption = Annotated[str, typer.Option("--model", help="model.toml, or a list such as bias,scale,misalignment.")]
+OutOption = Annotated[Path | None, typer.Option("-o", "--output", help="Where to write calibration.toml.")]
+SensorOption = Annotated[str | None, typer.Option("--sensor", help="Sensor name or .toml: easy axes and H_k.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands to the roof."""
+    for command in (fit, compare, diagnose, add, remove, verify, convert, effects):
+        app.command()(command)
+
+
+def fit(
+    log: LogPath,
+    model: ModelOption = "",
+    method: Annotated[str | None, typer.Option(help="A published method by name, for example ellipsoid.")] = None,
+    output: OutOption = None,
+    selfcal: Annotated[Path | None, typer.Option(help="Board record with the coil run of the same day.")] = None,
+    sensor: SensorOption = None,
+    as_json: bool = AS_JSON,
+) -> None:
+    """Fit a model to a log and write the calibration."""
+    if not (model or method):
+        raise InputError(must("fit", "given --model or --method", "neither"))
+    data = read_log(log)
+    found, file = _by_method(data, method, model) if method else _by_model(data, model, sensor)
+    calibration = calibration_of(found, data, file, method or "fit")
+    run = read_log(selfcal).selfcal if selfcal else data.selfcal
+    if run is not None:
+        calibration = with_selfcal(calibration, run, _sensor_of(data, file, sensor) or load_sensor("hmc1021_1022"))
+    if output:
+        write_calibration(calibration, output)
+    if as_json:
+        print_json(show.fit_json(found, data))
+    else:
+        notes(data.notes)
+        show.fit_tables(found, output)
+
+
+def _by_method(data: Log, method: str, model: str) -> tuple[Fit, ModelFile]:
+    return find_method(method)(data, read_model(model).reference if model else None)
+
+
+def _by_model(data: Log, model: str, sensor: str | None) -> tuple[Fit, ModelFile]:
+    file = read_model(model)
+    seen, extra = _seen(data, file, sensor)
+    with progress("fit", None) as tick:
+        return fit_observations(seen, file, extra, tick), file
+
+
+def _seen(data: Log, file: ModelFile, sensor: str | None = None) -> tuple[Observations, tuple[Effect, ...]]:
+    return observations(data, _sensor_of(data, file, sensor)), load_plugins(file.plugins)
+
+
+def _sensor_of(data: Log, file: ModelFile, sensor: str | None) -> Sensor | None:
+    """The sensor named on the command line, in the model file, or by the board that wrote the log."""
+    name = sensor or file.sensor or data.meta.get("sensor")
+    return load_sensor(name) if name else None
+
+
+def compare(log: LogPath, model: ModelOption, sensor: SensorOption = None, as_json: bool = AS_JSON) -> None:
+    """Hold the model against the measurement: residual by axis and against every covariate."""
+    data, file = read_log(log), read_model(model)
+    seen, extra = _seen(data, file, sensor)
+    found = compare_fit(fit_observations(seen, file, extra), extra=extra)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        notes(data.notes)
+        show.comparison(found)
+
+
+def diagnose(
+    logs: Annotated[list[Path], typer.Argument(help="One or several logs.")],
+    model: ModelOption,
+    noise: Annotated[Path | None, typer.Option(help="A log of the sensor at rest.")] = None,
+    sensor: SensorOption = None,
+    as_json: bool = AS_JSON,
+) -> int:
+    """Where the model fails and which physical effect is missing."""
+    file = read_model(model)
+    extra, rest = load_plugins(file.plugins), read_log(noise) if noise else None
+    bad = 0
+    for path in logs:
+        try:
+            data = read_log(path)
+            found = diagnose_log(data, file, rest, _sensor_of(data, file, sensor), extra)
+        except BarberpoleError as error:
+            if len(logs) == 1:
+                raise
+            bad = 2
+            print_json({"log": str(path), "error": str(error)}) if as_json else ERR.print(f"{path}: {error}")
+            continue
+        if as_json:
+            print_json(({"log": str(path)} if len(logs) > 1 else {}) | found.to_json())
+        else:
+            notes(data.notes)
+            show.diagnosis(path, found)
+    return bad
+
+
+def add(
+    effect: str,
+    model: ModelOption,
+    log: LogPath,
+    output: OutOption = None,
+    sensor: SensorOption = None,
+    as_json: bool = AS_JSON,
+) -> None:
+    """Put an effect into the model file, refit, and show the error before and after."""
+    _change(effect, model, log, output, sensor, as_json, add_effect)
+
+
+def remove(
+    effect: str,
+    model: ModelOption,
+    log: LogPath,
+    output: OutOption = None,
+    sensor: SensorOption = None,
+    as_json: bool = AS_JSON,
+) -> None:
+    """Take an effect out of the model file, refit, and show the error before and after."""
+    _change(effect, model, log, output, sensor, as_json, remove_effect)
+
+
+def _change(effect, model, log, output, sensor, as_json, edit) -> None:
+    data, before = read_log(log), read_model(model)
+    after = edit(before, effect)
+    seen, extra = _seen(data, before, sensor)
+    found = change(seen, before, after, effect, extra)
+    if output:
+        old = read_calibration(output) if output.exists() else None
+        write_calibration(_with_history(found, data, after, old, edit is add_effect), output)
+    if before.path:
+        write_model(after, before.path)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        notes(data.notes)
+        show.change(found, before.path)
+
+
+def _with_history(found: Change, data: Log, file: ModelFile, old: Calibration | None, added: bool) -> Calibration:
+    first = () if old is None else old.history
+    if not first:
+        first = (Step(rms_lsb=found.before.rms_lsb, heldout_rms_lsb=found.before.heldout_rms_lsb),)
+    names = {"added" if added else "removed": found.effect}
+    step = Step(rms_lsb=found.after.rms_lsb, heldout_rms_lsb=found.after.heldout_rms_lsb, **names)
+    return calibration_of(found.after, data, file, history=(*first, step))
+
+
+def verify(
+    log: LogPath,
+    calibration: Annotated[Path, typer.Option(help="calibration.toml to hold the log against.")],
+    as_json: bool = AS_JSON,
+) -> int:
+    """Is this board still what the calibration says? Exit 1 if not."""
+    data = read_log(log)
+    found = verify_log(data, read_calibration(calibration))
+    if as_json:
+        print_json(found.to_json())
+    else:
+        notes(data.notes)
+        show.verification(found)
+    return 0 if found.passed else 1
+
+
+def convert(log: LogPath, output: Annotated[Path, typer.Option("-o", "--output", help=".csv or .parquet")]) -> None:
+    """Write a log in another format."""
+    data = read_log(log)
+    write_log(data, output)
+    notes(data.notes)
+    OUT.print(f"{data.n} rows written to {output}")
+
+
+def effects(as_json: bool = AS_JSON) -> None:
+    """The catalogue of physical effects, in physical order."""
+    if as_json:
+        print_json({"effects": [{"name": e.name, "equation": e.equation, "source": e.source} for e in STACK]})
+    else:
+        show.catalogue(STACK)

@@ -1,0 +1,61 @@
+"""What the commands share: JSON on stdout, tables for people, progress on stderr."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+OUT = Console(highlight=False, soft_wrap=True)
+ERR = Console(stderr=True, highlight=False)
+
+AS_JSON = typer.Option(False, "--json", help="Print one JSON object and nothing else.")
+
+
+def print_json(answer: dict[str, Any]) -> None:
+    """One line of strict JSON: what is not a finite number becomes null."""
+    print(json.dumps(_strict(answer)), flush=True)
+
+
+def _strict(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _strict(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_strict(inner) for inner in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def table(title: str, *heads: str) -> Table:
+    """An empty table in the one look of all tables: numbers to the right, the first column to the left."""
+    made = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False)
+    for at, head in enumerate(heads):
+        made.add_column(head, justify="left" if at == 0 else "right")
+    return made
+
+
+def notes(sentences: tuple[str, ...]) -> None:
+    """Remarks about the input, on stderr."""
+    for sentence in sentences:
+        ERR.print(f"note: {sentence}", style="dim")
+
+
+@contextmanager
+def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
+    """A progress bar on stderr while the work runs; call what it yields with the amount just done."""
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=ERR, transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.advance(task, done)

@@ -1,0 +1,59 @@
+"""A model with its numbers: what a calibration file stands for, ready to predict, to compensate and to compile."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from barberpole.calibration import Calibration
+from barberpole.effects import Conditions, Effect, Setup
+from barberpole.errors import InputError, must
+from barberpole.model import Model, compose, find_effect
+from barberpole.plugins import load_plugins
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Model, parameter vector p (P,), and the conditions that belong to the sensor and not to a sample."""
+
+    model: Model
+    p: np.ndarray
+    easy_axis: tuple[int, int, int]
+    t0_c: float
+
+    def conditions(self, **known) -> Conditions:
+        """Conditions with this sensor's easy axes and reference temperature."""
+        return Conditions(easy_axis=self.easy_axis, t0_c=self.t0_c, **known)
+
+    def undo_pair(self, set_xyz, reset_xyz, at: Conditions):
+        """Field in µT from a SET and a RESET reading, both with the sign of SET."""
+        return self.model.undo_pair(set_xyz, reset_xyz, self.p, at)
+
+
+def from_calibration(calibration: Calibration) -> Fitted:
+    """The fitted model of a calibration. Parameters it could not determine stay at their null.
+
+    Raises InputError if the parameters are not those of the effects it names.
+    """
+    extra = load_plugins(calibration.model.plugins)
+    model = _same_parameters(calibration, extra)
+    p = model.null.copy()
+    for at, name in enumerate(model.names):
+        if name in calibration.parameters:
+            p[at] = calibration.parameters[name].value
+    return Fitted(model, p, calibration.easy_axis, calibration.t0_c)
+
+
+def _same_parameters(calibration: Calibration, extra: tuple[Effect, ...]) -> Model:
+    """An effect's list of parameters depends on the reference and the flipping of the log: find the ones that fit."""
+    names = {*calibration.parameters, *calibration.unobservable}
+    settings = calibration.model.settings
+    for reference, flipping in product(("vector", "constant"), ("none", "raw", "corrected")):
+        setups = {
+            find_effect(name, extra).name: Setup(settings.get(name, {}), reference, flipping)
+            for name in calibration.model.effects
+        }
+        model = compose(calibration.model.effects, setups, extra)
+        if set(model.names) == names:
+            return model
+    raise InputError(must("the calibration", "one whose parameters belong to its effects", ", ".join(sorted(names))))

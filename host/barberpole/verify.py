@@ -1,0 +1,166 @@
+"""Is this board still what its calibration says? Each check gives a sentence with its figure."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from barberpole.calibration import Calibration
+from barberpole.errors import InputError, must
+from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
+from barberpole.fit.residual import Problem
+from barberpole.fitted import Fitted, from_calibration
+from barberpole.log import Log
+from barberpole.observations import Observations, observations
+from barberpole.reasons import sentence
+from barberpole.selfcal import SelfcalResult, recompute
+
+FLOAT32_PPM = 10.0  # the board computes in float32; more than this is not rounding
+WORSE = 1.5  # a residual this many times the calibration's own is a change, not chance
+GAIN_DRIFT = 0.05  # of the factory gain, where the board's header does not give its limit
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question with its answer."""
+
+    name: str
+    ok: bool
+    sentence: str
+    figures: dict[str, object]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of one log against one calibration."""
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        return all(check.ok for check in self.checks)
+
+    def to_json(self) -> dict:
+        """The object of `verify --json`."""
+        figures = {key: value for check in self.checks for key, value in check.figures.items()}
+        failed = [check.sentence for check in self.checks if not check.ok]
+        return {"pass": self.passed, "reasons": failed, "checks": [c.name for c in self.checks], **figures}
+
+
+def verify(log: Log, calibration: Calibration) -> Verification:
+    """Hold a log against a calibration. Raises InputError if the board ran another model, or nothing can be checked."""
+    fitted = from_calibration(calibration)
+    checks = [*_identity(log, calibration), *_selfcal(log, calibration, fitted)]
+    checks += _readings(log, calibration, fitted)
+    return Verification(tuple(checks))
+
+
+def _identity(log: Log, calibration: Calibration) -> Iterator[Check]:
+    model, running = log.meta.get("model"), log.meta.get("calibration")
+    if model and model != calibration.model.hash:
+        raise InputError(must("the board's model", calibration.model.hash, model, log.path))
+    if running:
+        yield Check(
+            "calibration",
+            running == calibration.hash,
+            f"The board runs calibration {running}; this file is {calibration.hash}.",
+            {"calibration": calibration.hash, "running": running},
+        )
+
+
+def _selfcal(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Check]:
+    run = log.selfcal
+    if run is None:
+        return
+    if run.result is None:
+        yield Check("selfcal", False, "The board's self-calibration has no verdict in this log.", {})
+        return
+    accepted, codes = bool(run.result.get("accepted")), list(run.result.get("reasons", []))
+    yield Check(
+        "selfcal",
+        accepted,
+        "The board accepted its self-calibration." if accepted else f"The board refused its run: {sentence(codes)}",
+        {"selfcal_accepted": accepted, "selfcal_reasons": codes},
+    )
+    if calibration.selfcal is not None:
+        again = recompute(run, fitted, np.asarray(calibration.selfcal.gain_ut_per_unit))
+        yield from _gains(run.result, again)
+
+
+def _gains(result: dict, again: SelfcalResult) -> Iterator[Check]:
+    drift = float(np.max(np.abs(again.gain - 1.0)))
+    yield Check(
+        "gain_drift",
+        drift <= GAIN_DRIFT,
+        f"The gains are within {100 * drift:.3f} % of the factory's; {100 * GAIN_DRIFT:.0f} % is allowed.",
+        {"gain": again.gain.tolist(), "gain_drift": drift},
+    )
+    if result.get("accepted") and "gain" in result:
+        ppm = float(np.max(np.abs(np.asarray(result["gain"]) / again.gain - 1.0)) * 1e6)
+        yield Check(
+            "float32",
+            ppm <= FLOAT32_PPM,
+            f"Board (float32) and host (double) agree within {ppm:.2f} ppm on the same points.",
+            {"board_against_host_ppm": ppm},
+        )
+
+
+def _readings(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Check]:
+    seen = _with_sensor(observations(log), fitted, log)
+    magnitude = float(calibration.model.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
+    problem = Problem(fitted.model, seen, magnitude)
+    if problem.vector:
+        yield _against_field(problem, fitted, calibration)
+    else:
+        yield _against_norm(problem, fitted, calibration)
+
+
+def _with_sensor(seen: Observations, fitted: Fitted, log: Log) -> Observations:
+    """Observations under this sensor's conditions, with the gains in force on the board."""
+    at = replace(seen.at, easy_axis=fitted.easy_axis, t0_c=fitted.t0_c, gain=gains_in_force(log))
+    return replace(seen, at=at)
+
+
+def gains_in_force(log: Log) -> tuple[float, float, float]:
+    """Today's gains over the factory's, as the board compensates with them; 1 without a self-calibration."""
+    result = (log.selfcal.result if log.selfcal else None) or {}
+    x, y, z = result.get("gain_in_force", result.get("gain") if result.get("accepted") else None) or (1.0, 1.0, 1.0)
+    return float(x), float(y), float(z)
+
+
+def _against_field(problem: Problem, fitted: Fitted, calibration: Calibration) -> Check:
+    rms = float(np.sqrt(np.mean(problem.residual(fitted.p) ** 2)))
+    before = calibration.residual.rms_lsb
+    return Check(
+        "residual",
+        rms <= WORSE * before,
+        f"The residual is {rms:.4g} LSB; the calibration left {before:.4g} LSB, {WORSE:g} times that is allowed.",
+        {"rms_lsb": rms, "calibration_rms_lsb": before},
+    )
+
+
+def _against_norm(problem: Problem, fitted: Fitted, calibration: Calibration) -> Check:
+    field = np.concatenate(
+        [fitted.model.invert(problem.seen.y[:, r], fitted.p, problem.seen.at.take(r)) for r in problem.chunks()], axis=1
+    )
+    norm = np.linalg.norm(field, axis=0)
+    known = problem.seen.b_mag if problem.seen.b_mag is not None else float(np.mean(norm))
+    percent = float(100.0 * np.sqrt(np.mean((norm / known - 1.0) ** 2)))
+    before = _norm_percent(calibration)
+    return Check(
+        "norm",
+        percent <= WORSE * before,
+        f"|B| scatters by {percent:.3g} % about its mean; the calibration left {before:.3g} %, "
+        f"{WORSE:g} times that is allowed.",
+        {"rms_norm_percent": percent, "calibration_norm_percent": before, "mean_norm_ut": float(np.mean(norm))},
+    )
+
+
+def _norm_percent(calibration: Calibration) -> float:
+    """What the calibration left in the norm, in %; from a vector fit, its error over the field it saw."""
+    residual = calibration.residual
+    if residual.rms_norm_percent is not None:
+        return residual.rms_norm_percent
+    if residual.rms_ut is None or not calibration.validity.b_max_ut:
+        raise InputError(must("the calibration", "one with a residual in µT or in % of the norm", "neither"))
+    return 100.0 * residual.rms_ut / calibration.validity.b_max_ut
