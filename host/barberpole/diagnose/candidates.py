@@ -2,63 +2,62 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from barberpole.diagnose.columns import Ground, Shape, shape_of
-from barberpole.effects import STACK, Effect, Setup
+from barberpole.diagnose.columns import Candidate, Ground, candidate
+from barberpole.effects import Effect, Setup, in_order
+from barberpole.effects.effect import Shape
 from barberpole.fit.fit import Fit, missing_columns, setup_of
 
 
 @dataclass(frozen=True)
 class Absent:
-    """Effects to judge, each with the settings of its forms, and those that cannot be judged with the reason."""
+    """Effects to judge with the settings of the model file, and those that cannot be judged with the reason.
 
-    effects: tuple[tuple[Effect, tuple[dict[str, Any], ...]], ...]
+    state_known: the log says whether it is demodulated; if not, one magnetisation is tried too.
+    """
+
+    effects: tuple[Effect, ...]
+    settings: dict[str, dict]
     unjudged: dict[str, str]
+    state_known: bool = True
 
 
 def absent_effects(fit: Fit, extra: Sequence[Effect], settings: dict[str, dict], state_known: bool) -> Absent:
     """What the catalogue and the plugins hold beyond the model."""
     judged, unjudged = [], {}
-    for effect in (*STACK, *extra):
+    for effect in in_order(extra):
         if effect.name in fit.model.effects:
             continue
         lacking = missing_columns(fit.problem.seen, effect)
         if lacking:
             unjudged[effect.name] = f"no {lacking[0]} column"
         else:
-            judged.append((effect, _forms(effect, settings.get(effect.name, {}), state_known)))
-    return Absent(tuple(judged), unjudged)
+            judged.append(effect)
+    return Absent(tuple(judged), settings, unjudged, state_known)
 
 
-def _forms(effect: Effect, settings: dict[str, Any], state_known: bool) -> tuple[dict[str, Any], ...]:
-    """A log that does not say its state may be demodulated or of one magnetisation: both are tried."""
-    if effect.flips and not state_known and "form" not in settings:
-        return settings, settings | {"form": "unflipped"}
-    return (settings,)
-
-
-def shapes(ground: Ground, absent: Absent) -> list[Shape]:
-    """Columns of every absent effect at the fitted model."""
+def candidates(ground: Ground, absent: Absent) -> list[Candidate]:
+    """Columns of every absent effect in each of its forms, at the fitted model."""
     found = []
-    for effect, forms in absent.effects:
-        if effect.name in ground.fit.model.effects:
+    for effect in absent.effects:
+        if effect.name in ground.fit.model.effects or effect.loss:
             continue
-        for settings in forms:
-            setup = setup_of(ground.fit.problem.seen, ground.fit.linear, settings)
-            found.append(shape_of(_in_form(ground, settings), effect, setup))
-    return [shape for shape in found if np.all(np.isfinite(shape.columns))]
+        for shape, setup in _forms(ground, absent, effect):
+            one = candidate(ground, effect, shape, setup.settings, setup)
+            if one.columns.shape[1] and np.all(np.isfinite(one.columns)):
+                found.append(one)
+    return found
 
 
-def _in_form(ground: Ground, settings: dict[str, Any]) -> Ground:
-    """The ground as of one magnetisation, for the form `unflipped`."""
-    if settings.get("form") != "unflipped" or len(ground.pathways) == 1:
-        return ground
-    return replace(ground, pathways=[replace(ground.pathways[0], weight=1.0)])
-
-
-def setup_for(ground: Ground, shape: Shape) -> Setup:
-    """The setup that a refit with this shape takes."""
-    return setup_of(ground.fit.problem.seen, ground.fit.linear, shape.settings)
+def _forms(ground: Ground, absent: Absent, effect: Effect) -> list[tuple[Shape, Setup]]:
+    seen, fit = ground.fit.problem.seen, ground.fit
+    base = setup_of(seen, fit.linear, absent.settings.get(effect.name))
+    shapes = list(effect.forms(base))
+    if effect.search and ground.normal is None:
+        shapes += effect.search(base, seen.at, seen.y, ground.residual)
+    setups = [(shape, replace(base, settings=base.settings | shape.settings)) for shape in shapes]
+    if effect.flips and not absent.state_known and "form" not in base.settings:
+        setups += [(s, replace(u, settings=u.settings | {"form": "unflipped"})) for s, u in setups]
+    return setups

@@ -1,42 +1,49 @@
 """What each absent effect would add to the readings: its derivatives at the null, carried through the fitted model.
 
 Where the derivative at the null explains nothing (cross_field of demodulated readings is even in k) the secant to the
-effect's typical size stands in. Effects with inner parameters bring several shapes.
+effect's typical size stands in. Effects with inner parameters bring several forms.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from barberpole.effects import STACK, Conditions, Effect, Setup
+from barberpole.chain import UNIT, add_columns, full, solve3, sum_slopes, through
+from barberpole.effects import Conditions, Effect, Setup, in_order
+from barberpole.effects.effect import Shape, spread
 from barberpole.fit.fit import Fit
-from barberpole.model import push, solve3
 
-FLAT = 1e-3  # a derivative this small beside the secant explains nothing
+FLAT = 1e-3  # a derivative this small beside the others of its effect explains nothing
+NONE = np.zeros((3, 0, 1))
 
 
 @dataclass(frozen=True)
-class Shape:
-    """One form of an absent effect: columns (m, K, n) in LSB per parameter unit, and where a refit starts."""
+class Candidate:
+    """One form of an absent effect: columns (m, K, n) in LSB per parameter unit, the `names` of their parameters,
+    and what a refit in this form starts from."""
 
     effect: Effect
-    label: str
+    setup: Setup
     columns: np.ndarray
-    start: np.ndarray
+    names: tuple[str, ...]
     typical: np.ndarray
-    settings: dict[str, Any] = field(default_factory=dict)
+    linear: bool
+    start: dict[str, float]
+    tried: int = 1
 
 
 @dataclass(frozen=True)
 class Pathway:
-    """The fitted model traversed once in one magnetisation: the input (3, n) and slope of every stage."""
+    """The fitted model traversed once in one magnetisation. Stage i takes inputs[i]; tails[i] is the slope of the
+    reading by that input. The last input is the reading itself."""
 
     weight: float
     at: Conditions
     inputs: list[np.ndarray]
     slopes: list[np.ndarray | None]
+    tails: list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,15 @@ class Ground:
 
     def seen_through(self, columns: np.ndarray) -> np.ndarray:
         """(3, K, n) of readings -> (m, K, n) of residuals."""
-        return columns if self.normal is None else np.einsum("in,ikn->kn", self.normal, columns)[None]
+        if self.normal is None:
+            return columns
+        return sum(self.normal[i] * columns[i] for i in range(3))[None]
+
+    def unflipped(self) -> "Ground":
+        """The same with readings of unknown state taken as of one magnetisation."""
+        if len(self.pathways) == 1:
+            return self
+        return replace(self, pathways=[replace(self.pathways[0], weight=1.0)])
 
 
 def ground_of(fit: Fit, extra: Sequence[Effect] = ()) -> Ground:
@@ -67,25 +82,29 @@ def ground_of(fit: Fit, extra: Sequence[Effect] = ()) -> Ground:
     The raw fitted field carries the reading's noise and would make columns that reproduce the residual itself.
     """
     seen = fit.problem.seen
-    order = tuple(e.name for e in (*STACK, *extra))
+    order = tuple(e.name for e in in_order(extra))
     if seen.b_ut is not None:
         return Ground(fit, seen.b_ut, fit.problem.residual(fit.p), _pathways(fit, seen.b_ut), None, order)
     raw = fit.field()
     norm, known = np.linalg.norm(raw, axis=0), fit.problem.magnitude(slice(None))
     field_ut = raw * (known / norm)
-    _, _, slope = fit.model.linearise(field_ut, fit.p, seen.at, field_too=True)
-    normal = solve3(slope.transpose(1, 0, 2), field_ut / known)  # gradient of |B| with respect to the reading
+    paths = _pathways(fit, field_ut)
+    slope = None
+    for path in paths:
+        slope = sum_slopes(slope, path.weight * path.tails[0])
+    transposed = np.swapaxes(full(np.asarray(slope), norm.size), 0, 1)
+    normal = solve3(transposed, field_ut / known)  # gradient of |B| with respect to the reading
     steep = np.linalg.norm(normal, axis=0)
-    return Ground(fit, field_ut, ((norm - known) / steep)[None], _pathways(fit, field_ut), normal / steep, order)
+    return Ground(fit, field_ut, ((norm - known) / steep)[None], paths, normal / steep, order)
 
 
 def _pathways(fit: Fit, field_ut: np.ndarray) -> list[Pathway]:
     at = fit.problem.seen.at
     known = np.asarray(at.state, float)
-    if fit.model.unflipped:
-        states = [(1.0, np.where(known == 0, 1.0, known))]
-    elif np.all(known != 0):
+    if np.all(known != 0):
         states = [(1.0, known)]
+    elif fit.model.unflipped:
+        states = [(1.0, np.where(known == 0, 1.0, known))]
     else:
         states = [(0.5, np.where(known == 0, s, known)) for s in (1.0, -1.0)]
     return [_traverse(fit, field_ut, weight, replace(at, state=state)) for weight, state in states]
@@ -94,44 +113,61 @@ def _pathways(fit: Fit, field_ut: np.ndarray) -> list[Pathway]:
 def _traverse(fit: Fit, field_ut: np.ndarray, weight: float, at: Conditions) -> Pathway:
     inputs, slopes = [field_ut], []
     for term in fit.model.terms:
-        p = fit.p[term.at]
-        slopes.append(term.effect.derivatives(inputs[-1], p, at)[0])
-        inputs.append(np.asarray(term.effect.forward(inputs[-1], p, at)))
-    return Pathway(weight, at, inputs, slopes)
+        out, d_in, _ = term.effect.linearise(inputs[-1], fit.p[term.at], at)
+        inputs.append(out)
+        slopes.append(d_in)
+    tails = [UNIT]
+    for d_in in reversed(slopes):
+        tails.insert(0, through(tails[0], d_in))
+    return Pathway(weight, at, inputs, slopes, tails)
 
 
-def shape_of(ground: Ground, effect: Effect, setup: Setup, label: str = "") -> Shape:
-    """The columns of an absent effect."""
+def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, Any], setup: Setup) -> Candidate:
+    """One form of an absent effect as columns."""
+    if settings.get("form") == "unflipped":
+        ground = ground.unflipped()
     params = effect.params(setup)
-    null = np.array([q.null for q in params])
+    names = [q.name for q in params]
+    null = np.array([shape.inner.get(q.name, q.null) for q in params])
+    wanted = np.array([q.name in shape.columns if shape.columns else not q.inner for q in params])
     typical = np.array([q.typical or 1.0 for q in params])
-    columns = _derivative(ground, effect, null)
-    flat = np.sqrt(np.sum(columns**2, axis=(0, 2))) * np.abs(typical)
-    for j in np.flatnonzero(flat <= FLAT * flat.max(initial=0.0) + 1e-30):
-        columns[:, j] = _secant(ground, effect, null, j, typical[j])
-    start = np.array([q.first for q in params])
-    return Shape(effect, label or effect.name, ground.seen_through(columns), start, typical, dict(setup.settings))
+    columns = np.asarray(ground.seen_through(_columns(ground, effect, null, typical, wanted, shape.secant)))
+    start = {q.name: q.first for q in params} | shape.inner
+    picked = tuple(name for name, w in zip(names, wanted, strict=True) if w)
+    return Candidate(effect, setup, columns, picked, typical[wanted], not shape.secant, start, shape.tried)
+
+
+def _columns(ground, effect, null, typical, wanted, secant) -> np.ndarray:
+    """(3, K, n) for the wanted parameters."""
+    picked = np.flatnonzero(wanted)
+    if secant:
+        return np.stack([_secant(ground, effect, null, j, typical[j]) for j in picked], axis=1)
+    columns = _derivative(ground, effect, null)[:, picked]
+    size = np.sqrt(np.sum(columns**2, axis=(0, 2))) * np.abs(typical[picked])
+    for i in np.flatnonzero(size <= FLAT * size.max(initial=0.0)):
+        columns[:, i] = _secant(ground, effect, null, picked[i], typical[picked[i]])
+    return columns
 
 
 def _derivative(ground: Ground, effect: Effect, p: np.ndarray) -> np.ndarray:
-    total = 0.0
+    stage, n = _stage(ground, effect), ground.field.shape[1]
+    total = np.zeros((3, len(p), n))
     for path in ground.pathways:
-        stage = _stage(ground, effect)
-        d_p = effect.derivatives(path.inputs[stage], p, path.at)[1]
-        total = total + path.weight * _carry(path, stage, d_p)
-    return np.asarray(total)
+        d_p = effect.linearise(path.inputs[stage], p, path.at)[2]
+        total += path.weight * _carry(ground, path, stage, d_p, n)
+    return total
 
 
 def _secant(ground: Ground, effect: Effect, null: np.ndarray, j: int, size: float) -> np.ndarray:
     p = null.copy()
     p[j] += size
-    total = 0.0
+    stage, n = _stage(ground, effect), ground.field.shape[1]
+    total = np.zeros((3, n))
     for path in ground.pathways:
-        stage = _stage(ground, effect)
         xyz = path.inputs[stage]
         change = np.asarray(effect.forward(xyz, p, path.at)) - np.asarray(effect.forward(xyz, null, path.at))
-        total = total + path.weight * _carry(path, stage, change[:, None] / size)[:, 0]
-    return np.asarray(total)
+        total += path.weight * _carry(ground, path, stage, change[:, None] / size, n)[:, 0]
+    return total
 
 
 def _stage(ground: Ground, effect: Effect) -> int:
@@ -140,9 +176,25 @@ def _stage(ground: Ground, effect: Effect) -> int:
     return sum(ground.order.index(name) < place for name in ground.fit.model.effects)
 
 
-def _carry(path: Pathway, stage: int, columns: np.ndarray) -> np.ndarray:
-    """Columns (3, K, n) at a stage, as they arrive in the reading."""
-    for slope in path.slopes[stage:]:
-        if slope is not None:
-            columns = push(slope, columns)
+def _carry(ground: Ground, path: Pathway, stage: int, columns: np.ndarray, n: int) -> np.ndarray:
+    """Columns (3, K, n), or (K, n) where parameter j acts on axis j % 3 alone, at a stage, as they reach the reading."""
+    terms = ground.fit.model.terms
+    with_memory = [i for i in range(stage, len(terms)) if terms[i].effect.tangent]
+    if not with_memory:
+        out = np.zeros((3, columns.shape[-2], n))
+        add_columns(out, path.tails[stage], columns)
+        return out
+    columns = np.broadcast_to(spread(columns) if columns.ndim == 2 else columns, (3, columns.shape[-2], n))
+    for i in range(stage, len(terms)):
+        columns = _through_stage(terms[i], path, i, columns, ground.fit.p)
     return columns
+
+
+def _through_stage(term, path: Pathway, i: int, columns: np.ndarray, p: np.ndarray) -> np.ndarray:
+    if term.effect.tangent:
+        return term.effect.tangent(path.inputs[i], p[term.at], path.at, columns)
+    if path.slopes[i] is None:
+        return columns
+    out = np.zeros(columns.shape)
+    add_columns(out, np.asarray(path.slopes[i]), columns)
+    return out

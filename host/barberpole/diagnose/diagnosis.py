@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from barberpole.diagnose.candidates import Absent, absent_effects, shapes
+from barberpole.diagnose.candidates import Absent, absent_effects, candidates
 from barberpole.diagnose.columns import Ground, ground_of
 from barberpole.diagnose.experiments import next_experiment
 from barberpole.diagnose.noise import Noise, estimate
@@ -125,7 +125,7 @@ def _noise(fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[
         noise = estimate(rest.y, "rest")
         return noise if fit.problem.vector else replace(noise, white=noise.white.mean(keepdims=True))
     ground = ground_of(fit, extra)
-    left = _unexplained_residual(ground, [s.columns for s in shapes(ground, absent)])
+    left = _unexplained_residual(ground, [s.columns for s in candidates(ground, absent)])
     return estimate(left, "residual", slowest=8)
 
 

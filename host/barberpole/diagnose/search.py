@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from barberpole.diagnose.candidates import Absent, setup_for, shapes
-from barberpole.diagnose.columns import Ground, Shape, ground_of
+from barberpole.diagnose.candidates import Absent, candidates
+from barberpole.diagnose.columns import Candidate, Ground, ground_of
 from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.table import Design, Projection, Table, heldout, project, tabulate
 from barberpole.effects import Effect
@@ -25,7 +25,7 @@ class Evidence:
 
     fit: Fit
     ground: Ground
-    shapes: list[Shape]
+    shapes: list[Candidate]
     places: list[np.ndarray]
     baseline: np.ndarray
     table: Table
@@ -66,13 +66,13 @@ def p_value(evidence: Evidence, columns: np.ndarray) -> float:
 def examine(fit: Fit, absent: Absent, noise: Noise, extra: Sequence[Effect] = ()) -> Evidence:
     """The Gram matrix of a fit, its absent effects and its residual."""
     ground = ground_of(fit, extra)
-    candidates = shapes(ground, absent)
+    shapes = candidates(ground, absent)
     design = Design(ground.residual.shape[0])
     baseline = design.add(ground.baseline())
-    places = [design.add(shape.columns) for shape in candidates]
+    places = [design.add(shape.columns) for shape in shapes]
     design.add(ground.residual[:, None])
     table = tabulate(design, noise)
-    return Evidence(fit, ground, candidates, places, baseline, table, project(table, baseline), noise)
+    return Evidence(fit, ground, shapes, places, baseline, table, project(table, baseline), noise)
 
 
 def search(fit: Fit, absent: Absent, noise: Noise, extra: Sequence[Effect] = ()) -> tuple[list[Found], Evidence]:
@@ -105,7 +105,9 @@ def best_addition(evidence: Evidence, extra: Sequence[Effect]) -> Found | None:
 
 def promising(evidence: Evidence) -> list[tuple[float, int]]:
     """(linear gain, shape) of the best effects, one shape each."""
-    forms = {s.effect.name: sum(t.effect.name == s.effect.name for t in evidence.shapes) for s in evidence.shapes}
+    forms: dict[str, int] = {}
+    for shape in evidence.shapes:
+        forms[shape.effect.name] = forms.get(shape.effect.name, 0) + shape.tried
     best: dict[str, tuple[float, int]] = {}
     for at, shape in enumerate(evidence.shapes):
         gain = evidence.gain(evidence.places[at], forms[shape.effect.name])
@@ -115,11 +117,13 @@ def promising(evidence: Evidence) -> list[tuple[float, int]]:
 
 
 def _refitted(evidence: Evidence, at: int) -> Fit:
-    shape = evidence.shapes[at]
-    setup = setup_for(evidence.ground, shape)
-    names = [f"{shape.effect.name}.{q.name}" for q in shape.effect.params(setup)]
-    start = dict(zip(names, shape.start, strict=True))
-    return refit(evidence.fit, evidence.fit.setups | {shape.effect.name: setup}, start)
+    """The exact fit with this form, begun where the linear answer points if the form is linear."""
+    shape, name = evidence.shapes[at], evidence.shapes[at].effect.name
+    start = {f"{name}.{key}": value for key, value in shape.start.items()}
+    if shape.linear:
+        weights = evidence.projection.weights(evidence.places[at])[0]
+        start |= {f"{name}.{key}": float(w) for key, w in zip(shape.names, weights, strict=True)}
+    return refit(evidence.fit, evidence.fit.setups | {name: shape.setup}, start)
 
 
 def _after(fit: Fit, noise: Noise, extra: Sequence[Effect]) -> tuple[float, np.ndarray]:

@@ -1,11 +1,11 @@
 """Fit a model to a log: parameters, covariance, what cannot be determined, and the error on stretches left out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from barberpole.effects import Effect, Setup
+from barberpole.effects import Effect, Setup, find_effect
 from barberpole.errors import InputError
 from barberpole.fit import observability
 from barberpole.fit.gram import Gram, heldout_rms
@@ -13,7 +13,7 @@ from barberpole.fit.residual import Problem
 from barberpole.fit.solve import minimise
 from barberpole.fit.start import Linear, linear_part, start_values
 from barberpole.log import Log
-from barberpole.model import Model, compose, find_effect
+from barberpole.model import Model, compose
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations, observations
 
@@ -35,7 +35,7 @@ class Fit:
     free: np.ndarray
     converged: bool
     linear: Linear
-    setups: dict[str, Setup]
+    setups: dict[str, Setup] = field(default_factory=dict)
     extra: tuple[Effect, ...] = ()
 
     @property
@@ -122,13 +122,24 @@ def with_reference(seen: Observations, file: ModelFile) -> Observations:
 
 def setup_of(seen: Observations, linear: Linear, settings: dict | None = None) -> Setup:
     """What an effect may adapt its parameters to."""
+    at, t_s = seen.at, seen.at.t_s
+    duration = float(t_s[-1] - t_s[0]) if t_s is not None else 0.0
     return Setup(
         settings=settings or {},
         reference=seen.reference,
         flipping=flipping(seen),
         lsb_per_ut=linear.lsb_per_ut or 1.0,
         span_ut=1.5 * linear.span_ut,
+        duration_s=duration or float(seen.y.shape[1]),
+        interval_s=(duration or float(seen.y.shape[1])) / max(seen.y.shape[1] - 1, 1),
+        load_a=_largest(at.load_a),
+        current_ma=_largest(at.i_ma),
     )
+
+
+def _largest(values: np.ndarray | None) -> float:
+    """The largest magnitude, or 1 where there is none: only the scale of typical sizes hangs on it."""
+    return 1.0 if values is None else float(np.max(np.abs(values), initial=0.0)) or 1.0
 
 
 def flipping(seen: Observations) -> str:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.model import Model, solve3
+from barberpole.chain import solve3
+from barberpole.model import Model
 from barberpole.observations import Observations
 
 CHUNK = 4096  # samples at a time: the working set stays in the cache, and memory does not grow with the log

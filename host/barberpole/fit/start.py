@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from barberpole.effects.misalignment import LOWER, UPPER
-from barberpole.methods.ellipsoid import algebraic
+from barberpole.fit.ellipsoid import algebraic
 from barberpole.model import Model
 from barberpole.observations import Observations
 

@@ -1,0 +1,68 @@
+"""Two-step scalar calibration: an ellipsoid through the readings, split by Cholesky (thesis 4.8-4.20).
+
+While only the magnitude of the field is known, the readings h of a linear sensor lie on an ellipsoid
+    (h - b)^T D (h - b) = K^2,   D = L^T L,   H = L (h - b)                          (4.14, 4.17, 4.20)
+with L upper triangular, the choice that leaves out any rotation (4.18).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from barberpole.errors import InputError
+
+MIN_SAMPLES = 12  # nine unknowns, and something left to judge them by
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """H = L (h - b): L (3, 3) upper triangular in (unit of K)/LSB, b (3,) in LSB."""
+
+    upper: np.ndarray
+    centre: np.ndarray
+
+    def field(self, reading: np.ndarray) -> np.ndarray:
+        """Calibrated vector (3, n) from readings (3, n), eq. 4.20."""
+        return self.upper @ (reading - self.centre[:, None])
+
+
+def quadric_columns(h: np.ndarray) -> np.ndarray:
+    """The nine regressors of the quadric, (9, n): h^T D h and the linear part of 4.14."""
+    x, y, z = h
+    return np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, 2 * x, 2 * y, 2 * z])
+
+
+def algebraic(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
+    """Least-squares ellipsoid through readings (3, n) in LSB, scaled so that |H| = magnitude (4.19).
+
+    Raises InputError when the readings do not determine an ellipsoid, saying what is missing.
+    """
+    n = reading.shape[1]
+    if n < MIN_SAMPLES:
+        raise InputError(f"an ellipsoid fit must have at least {MIN_SAMPLES} samples; got {n}")
+    middle = 0.5 * (reading.max(axis=1) + reading.min(axis=1))
+    size = float(np.max(np.ptp(reading, axis=1))) / 2
+    if size == 0:
+        raise InputError("an ellipsoid fit must have readings that move; got constant readings on all axes")
+    columns = quadric_columns((reading - middle[:, None]) / size)
+    gram = columns @ columns.T
+    try:
+        q = np.linalg.solve(gram, columns.sum(axis=1))
+    except np.linalg.LinAlgError:
+        raise InputError(coverage_message(reading)) from None
+    d = np.array([[q[0], q[3], q[4]], [q[3], q[1], q[5]], [q[4], q[5], q[2]]])
+    if np.linalg.eigvalsh(d)[0] <= 0:
+        raise InputError(coverage_message(reading))
+    b = -np.linalg.solve(d, q[6:])
+    upper = np.linalg.cholesky(d / (1.0 + b @ d @ b)).T  # (h-b)^T D (h-b) = 1 + b^T D b
+    return Ellipsoid(magnitude * upper / size, middle + size * b)
+
+
+def coverage_message(reading: np.ndarray) -> str:
+    """What the readings lack, in a sentence: they fill a point, a line or a plane instead of a closed surface."""
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(reading)), 0.0))[::-1]
+    of_largest = spread / max(spread[0], 1e-300)
+    return (
+        "the readings must surround the sensor for an ellipsoid fit: turn it through all directions; got a cloud whose "
+        f"second and third extents are {100 * of_largest[1]:.0f} % and {100 * of_largest[2]:.0f} % of the first"
+    )
