@@ -1,0 +1,62 @@
+"""What the converter digitises: the sensor head's voltages through its sinc3 filter, with noise.
+
+Between events the head's voltages move slowly; a flip or a new coil current is a step. Each step is remembered until
+the filter has settled, and what is not settled yet is taken off the present voltage: superposition, exact for steps.
+"""
+
+import math
+
+from barberpole.board import Board
+from barberpole.twin.noise import Noise, NoiseLevel
+from barberpole.twin.physics import sinc3_step
+from barberpole.twin.sensor_head import AXES, INPUTS, SensorHead
+from barberpole.twin.world import World
+
+FILTER_PERIODS = 3  # length of a sinc3's impulse response
+CONVERTER_NOISE_V = 8e-6  # ADS131M08 at gain 1 and 8 kHz, rms of one conversion (data sheet, noise table, about)
+
+
+class AnalogInputs:
+    """The voltages of all inputs, conversion by conversion."""
+
+    def __init__(self, head: SensorHead, noise: Noise):
+        self.head = head
+        self._noise = noise
+        self._steps: list[tuple[float, list[float]]] = []
+
+    def change(self, t_us: float, act) -> None:
+        """Do `act` to the head at t_us and remember the steps that its voltages make."""
+        t_s = t_us * 1e-6
+        before = self.head.volts(t_s)
+        act()
+        after = self.head.volts(t_s)
+        if after is not before:
+            self._steps.append((t_us, [b - a for a, b in zip(before, after, strict=True)]))
+
+    def converted(self, end_us: float, period_us: float) -> list[float]:
+        """Volts of the conversion that ends at end_us, one per input."""
+        volts = self.head.volts((end_us - 0.5 * FILTER_PERIODS * period_us) * 1e-6)
+        if self._steps:
+            volts = self._unsettled(volts, end_us, period_us)
+        noise = self._noise.at(int(end_us // period_us))
+        return [v + n for v, n in zip(volts, noise, strict=True)]
+
+    def _unsettled(self, volts: list[float], end_us: float, period_us: float) -> list[float]:
+        self._steps = [step for step in self._steps if end_us - step[0] < FILTER_PERIODS * period_us]
+        for at_us, delta in self._steps:
+            missing = 1.0 - sinc3_step((end_us - at_us) / period_us)
+            volts = [v - missing * d for v, d in zip(volts, delta, strict=True)]
+        return volts
+
+
+def noise_level(board: Board, world: World) -> NoiseLevel:
+    """Noise of the inputs: the bridges' from the sensor's data sheet, the others' from the converter's."""
+    sensor, rate_hz = board.sensor, board.adc.sample_hz
+    v_per_rthz = 1e-3 * sensor.noise_nt_per_rthz * 1e-3 * sensor.sensitivity_mv_per_v_per_ut * sensor.bridge_v
+    white_v = [CONVERTER_NOISE_V] * INPUTS
+    flicker_v2 = [0.0] * INPUTS
+    for name in AXES:
+        channel = getattr(board.adc.channels, name)
+        white_v[channel] = world.noise * v_per_rthz * math.sqrt(0.5 * rate_hz)
+        flicker_v2[channel] = (world.flicker * v_per_rthz) ** 2 * sensor.corner_hz
+    return NoiseLevel(tuple(white_v), tuple(flicker_v2), 1.0 / rate_hz)

@@ -1,0 +1,146 @@
+"""The emulated board in a `with` statement.
+
+    with Twin(load_board("pybv11"), "flash", World.of(board), seed=1) as twin:
+        print(twin.port)            # a serial port for mpremote
+        twin.wait_until(2.0)        # two seconds of board time after power-up
+        twin.power_cycle(faults=("coil_open_x",))
+"""
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import TracebackType
+
+import barberpole
+from barberpole.board import Board
+from barberpole.errors import InputError, PortError, must
+from barberpole.twin.faults import check_faults
+from barberpole.twin.flash import make_image
+from barberpole.twin.interpreter import find_micropython
+from barberpole.twin.process import Power
+from barberpole.twin.running import Job
+from barberpole.twin.world import World
+
+ANSWER_S = 30.0
+STOP_S = 5.0
+POLL_S = 0.01
+
+
+class Twin:
+    """An emulated board with its flash image in `flash_dir`; powered up on entering, off on leaving."""
+
+    def __init__(
+        self,
+        board: Board,
+        flash_dir: str | Path,
+        world: World | None = None,
+        seed: int = 0,
+        faults: Iterable[str] = (),
+        files: Mapping[str, str | Path] | None = None,
+    ):
+        """`seed` sets noise and magnetisation at power-up; `files` maps paths on the board to files to put there.
+
+        Raises InputError for an unknown fault, a missing interpreter or files that do not fit.
+        """
+        self.world = World.of(board) if world is None else world
+        self._board, self._seed, self._faults = board, seed, check_faults(faults)
+        self._image = Path(flash_dir) / f"{board.name}.lfs2"
+        self._files = files or {}
+        self._process: subprocess.Popen | None = None
+        self.port = ""
+
+    def __enter__(self) -> "Twin":
+        micropython = find_micropython()
+        make_image(self._image, self._board.filesystem_kib, self._files, micropython)
+        here, there = socket.socketpair()
+        package_root = str(Path(barberpole.__file__).parents[1])
+        paths = [package_root, *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        command = [sys.executable, "-c", "from barberpole.twin.process import main; main()"]
+        self._process = subprocess.Popen(command, stdin=there, env=environment)
+        there.close()
+        self._control = Connection(here.detach())
+        self._control.send(Job(self._board, micropython, self._image))
+        self.port = self._ask("port")
+        self.power_cycle()
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Switch off and remove the port."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        self._control.close()
+        try:
+            process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+    def power_cycle(
+        self,
+        world: World | None = None,
+        seed: int | None = None,
+        faults: Iterable[str] | None = None,
+        cut_s: float = float("inf"),
+    ) -> None:
+        """Off and on again: same flash, fresh chips, new magnetisation; what is given replaces what it was.
+
+        cut_s: board time in s at which the power goes away again, until the next call.
+        """
+        self.world = self.world if world is None else world
+        self._seed = self._seed if seed is None else seed
+        self._faults = self._faults if faults is None else check_faults(faults)
+        self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s))
+
+    def kill(self) -> None:
+        """Pull the plug now; the board stays off until `power_cycle`."""
+        self._ask("power_off")
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the board has power."""
+        return self._ask("pid") != 0
+
+    def truth(self) -> dict:
+        """What the board cannot know: today's parameters (LSB, µT, mA), state, faults, incidents (see SensorHead.truth)."""
+        return self._ask("truth")
+
+    def virtual_time_s(self) -> float:
+        """Board time since power-up, as of its last request."""
+        return self._ask("time")
+
+    def wait_until(self, t_s: float, timeout_s: float = 60.0) -> None:
+        """Wait for board time t_s. Raises PortError when it does not come within timeout_s of real time.
+
+        Board time stands still at the prompt, and while more than a megabyte of output waits for a reader.
+        """
+        until = time.monotonic() + timeout_s
+        while (now_s := self.virtual_time_s()) < t_s:
+            if time.monotonic() > until or not self.is_on:
+                raise PortError(must("the board's clock", f"at {t_s:g} s within {timeout_s:g} s", f"{now_s:g} s", self.port))
+            time.sleep(POLL_S)
+
+    @property
+    def log_text(self) -> str:
+        """All that the board has said since it was made (the last megabyte)."""
+        return self._ask("log")
+
+    def _ask(self, command: str, argument: object = None):
+        if self._process is None:
+            raise InputError(must("the emulated board", "used inside its with statement", "a closed one"))
+        try:
+            self._control.send((command, argument))
+            if self._control.poll(ANSWER_S):
+                return self._control.recv()
+        except (EOFError, OSError):
+            pass
+        raise PortError(must("the emulated board", "alive", "no answer", self.port))

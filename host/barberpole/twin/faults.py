@@ -1,0 +1,28 @@
+"""What can be broken on the emulated board, by name."""
+
+from collections.abc import Iterable
+
+from barberpole.errors import InputError, must
+
+FAULTS = {
+    "coil_open_x": "the x coil's wire is open: no current, no field",
+    "coil_open_y": "the y coil's wire is open: no current, no field",
+    "coil_open_z": "the z coil's wire is open: no current, no field",
+    "coil_short_x": "the x coil is shorted: the current flows past it, larger than commanded",
+    "coil_short_y": "the y coil is shorted: the current flows past it, larger than commanded",
+    "coil_short_z": "the z coil is shorted: the current flows past it, larger than commanded",
+    "adc_stuck": "every conversion of the ADC repeats the first one",
+    "adc_silent": "the ADC never signals data and its output stays low",
+    "wrong_chip": "the ADC answers with the identity of another part",
+    "ambient_step": "the ambient field jumps while the coils are first driven",
+    "supply_low": "the strap supply is at 60 %: its pulses do not flip the bridges",
+}
+
+
+def check_faults(names: Iterable[str]) -> frozenset[str]:
+    """The names as a set. Raises InputError on one that is not in FAULTS."""
+    names = tuple(names)
+    for name in names:
+        if name not in FAULTS:
+            raise InputError(must("the fault", f"one of {', '.join(FAULTS)}", repr(name)))
+    return frozenset(names)

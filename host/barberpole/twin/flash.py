@@ -1,0 +1,42 @@
+"""The image of the board's file system: littlefs2, made and filled by MicroPython itself."""
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+from barberpole.errors import InputError, must
+from barberpole.twin.interpreter import SHIMS
+
+ERASED = b"\xff"
+KIB = 1024
+FILL_TIMEOUT_S = 60
+
+
+def make_image(path: Path, size_kib: int, files: Mapping[str, str | Path], micropython: str) -> None:
+    """An image of size_kib at `path`, kept when it is there, with `files` (path on the board -> file) added.
+
+    Raises InputError when the folder cannot be written or the files do not fit.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            path.write_bytes(ERASED * (size_kib * KIB))
+    except OSError as error:
+        raise InputError(must("the flash folder", "one that can be written", error.strerror, path.parent)) from None
+    if files:
+        _fill(path, files, micropython)
+
+
+def _fill(path: Path, files: Mapping[str, str | Path], micropython: str) -> None:
+    for source in files.values():
+        if not Path(source).is_file():
+            raise InputError(must("a file for the board", "there", "none", source))
+    job = {"image": str(path), "files": {name: str(Path(source).resolve()) for name, source in files.items()}}
+    environment = os.environ | {"BARBERPOLE_FILL": json.dumps(job), "MICROPYPATH": str(SHIMS)}
+    command = [micropython, str(SHIMS / "_fill.py")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=FILL_TIMEOUT_S, check=False)
+    if done.returncode:
+        reason = (done.stdout + done.stderr).strip().splitlines()[-1:]
+        raise InputError(must("the files for the board", "small enough for its flash", "".join(reason), path))

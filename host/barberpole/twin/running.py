@@ -1,0 +1,172 @@
+"""One start of the interpreter on the board, from its boot script to its exit: its wire, its terminal, its input."""
+
+import os
+import select
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from barberpole.board import Board
+from barberpole.twin.console import Console
+from barberpole.twin.interpreter import Interpreter
+from barberpole.twin.pins import PINS, SPI_CLOCK_HZ
+from barberpole.twin.soldered import Soldered
+from barberpole.twin.wire import Op, Wire
+
+INTERRUPT_S = 0.1  # a program that asks nothing for so long is interrupted by a signal
+PORT_RAM_KIB = 92  # of the STM32F405's RAM, what MicroPython itself takes; the rest is heap
+POWER_ON, HARD, SOFT = 1, 2, 0  # machine.reset_cause()
+CTRL_A, CTRL_C = b"\x01", b"\x03"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What makes a board, whatever its power does."""
+
+    board: Board
+    micropython: str
+    image: Path
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a start ended: wait status, prompt it was in, board time, and whether machine.reset() asked for it."""
+
+    status: int
+    raw: bool
+    now_us: int
+    hard: bool
+
+
+class Running:
+    """A running interpreter. `say` gets its output; `allow(t_us)` False means that the power is gone at that time."""
+
+    def __init__(self, job: Job, soldered: Soldered, cause: int, raw: bool, now_us: int, say: Callable[[bytes], None]):
+        self._say = say
+        self._console = Console(raw)
+        self._wire = Wire(soldered, self._on_op, now_us)
+        setup = self._setup(job, raw, cause, now_us)
+        self._interpreter = Interpreter(job.micropython, heap_bytes(job.board), setup)
+        self._wire.close_far_ends()
+        self._started = self._ready = self._hard = False
+        self._pending = b""  # input that waits for the prompt
+        self._interrupt_at: float | None = None
+
+    @property
+    def pid(self) -> int:
+        """Process id of the interpreter."""
+        return self._interpreter.pid
+
+    @property
+    def now_us(self) -> int:
+        """Board time of the last request, µs."""
+        return self._wire.now_us
+
+    @property
+    def wire_fd(self) -> int:
+        """Readable when the interpreter asks something."""
+        return self._wire.fileno
+
+    @property
+    def terminal_fd(self) -> int:
+        """Readable when the interpreter has said something, or has ended."""
+        return self._interpreter.fileno
+
+    def _setup(self, job: Job, raw: bool, cause: int, now_us: int) -> dict:
+        board, (to, source) = job.board, self._wire.far_ends
+        return {
+            "to": to,
+            "from": source,
+            "now": now_us,
+            "raw": raw,
+            "cause": cause,
+            "image": str(job.image),
+            "pins": PINS,
+            "drdy": board.adc.drdy_pin,
+            "adc_reset": board.adc.reset_pin,
+            "spi_clock_hz": SPI_CLOCK_HZ,
+            "cpu_mhz": round(board.cpu_mhz),
+            "uid": "TWIN-" + board.name[:7].upper().ljust(7, "0"),  # twelve bytes, as on the chip
+        }
+
+    def serve_wire(self, allow: Callable[[int], bool]) -> bool:
+        """Answer a request; False when there will be no more of them."""
+        alive = self._wire.serve(allow)
+        if not self._wire.interrupt:
+            self._interrupt_at = None  # an answer has brought it
+        return alive
+
+    def _on_op(self, op: Op) -> None:
+        if op == Op.STARTED:
+            self._started = True
+            self._wire.interrupt = CTRL_C in self._pending
+            self._pending = self._pending.replace(CTRL_C, b"")
+        elif op == Op.READY:
+            self._drain()
+            self._ready = True
+            if self._console.raw:
+                self._type(CTRL_A)  # a board stays in its raw prompt
+        elif op == Op.RESET:
+            self._hard = True
+            self.kill()
+
+    def _drain(self) -> None:
+        """Take all that the boot files have said, so that it is told apart from the prompt."""
+        output = select.poll()
+        output.register(self.terminal_fd, select.POLLIN)
+        while output.poll(0) and self.take_output():
+            pass
+
+    def take_output(self) -> bool:
+        """Pass on what the interpreter says; False when it has ended."""
+        try:
+            data = os.read(self.terminal_fd, 65536)
+        except OSError:
+            return False
+        executes = self._interpreter.executes
+        self._say(self._console.output(data, executes) if self._ready else self._console.plain(data, executes))
+        if self._ready and self._console.at_prompt and self._pending:
+            self._type(self._pending)
+            self._pending = b""
+        return bool(data)
+
+    def receive(self, data: bytes) -> bool:
+        """Input from the PC; True when it interrupts a program."""
+        interrupts = CTRL_C in data and self._started and self._interpreter.executes()
+        if interrupts:
+            self._wire.interrupt = True
+            self._interrupt_at = time.monotonic() + INTERRUPT_S
+            data = data.replace(CTRL_C, b"")
+        if self._ready and self._console.at_prompt:
+            self._type(data)
+        else:
+            self._pending += data
+        return interrupts
+
+    def look(self, now_s: float) -> None:
+        """A program that asks nothing cannot be answered with the interrupt: it gets a signal."""
+        if self._interrupt_at is None or now_s < self._interrupt_at:
+            return
+        self._interrupt_at, self._wire.interrupt = None, False
+        if not self._interpreter.interrupt() and self._ready:
+            self._type(CTRL_C)
+
+    def _type(self, data: bytes) -> None:
+        while data:
+            data = data[os.write(self.terminal_fd, data) :]
+
+    def kill(self) -> None:
+        """Take the power away."""
+        self._interpreter.kill()
+
+    def end(self) -> Ending:
+        """Wait for the exit and close everything."""
+        self._wire.close()
+        status = self._interpreter.close()
+        return Ending(status, self._console.raw, self._wire.now_us, self._hard)
+
+
+def heap_bytes(board: Board) -> int:
+    """The board's heap, doubled: objects of the 64-bit interpreter are twice the size."""
+    return 2 * 1024 * max(board.ram_kib - PORT_RAM_KIB, 32)

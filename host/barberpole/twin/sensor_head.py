@@ -1,0 +1,169 @@
+"""The three bridges with their straps and offset coils: from the fields of the world to voltages.
+
+    v_i = s_i (S_i f_i (1 + s_i d_i) + b_i) + o_i
+
+f is `physics.film_field` of the field on the die: the ambient field through soft iron and the tilted axes, plus the
+offset coils. A coil acts on its own die; of its neighbours' films it reaches a few per cent, along the sensitive axis
+(thesis 6.2.1: it does not reach their easy axis in a way that could be used).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from barberpole.board import Board
+from barberpole.twin.ambient import Stepped
+from barberpole.twin.physics import film_field, turns_over
+from barberpole.twin.world import IDENTITY, T0_C, World
+
+AXES = "xyz"
+INPUTS = 8
+SUPPLY_LOW = 0.6
+STEP_UT = (1.8, -1.2, 2.4)  # ambient_step: a car passing
+KEPT_STATES = 512  # voltages remembered while the surroundings stand still
+
+
+class SensorHead:
+    """State of the sensor: magnetisation per die, coil currents, and the surroundings that act on it."""
+
+    def __init__(self, board: Board, world: World, magnetisation: Sequence[int], faults: frozenset[str] = frozenset()):
+        self.board, self.world, self.faults = board, world, faults
+        self.magnetisation = list(magnetisation)
+        self.current_ma = [0.0, 0.0, 0.0]
+        self._easy = tuple(AXES.index(axis) for axis in board.sensor.easy_axis)
+        self._mount = mounting(world)
+        self.coil_ut_per_ma = coil_matrix(board, world, faults)
+        self.gain_v_per_ut = self._gains()
+        self._until_s = -1.0
+        self._field_ut: list[float] = [0.0, 0.0, 0.0]
+        self.temp_c = T0_C
+        self._known: dict[tuple, list[float]] = {}
+
+    def magnetise(self, state: int) -> None:
+        """A strap pulse aligns every die with `state`."""
+        self.magnetisation = [state] * 3
+
+    def drive(self, axis: int, share: float) -> None:
+        """Put `share` (-1..1) of the driver's full scale across the coil of an axis."""
+        if f"coil_open_{AXES[axis]}" in self.faults:
+            share = 0.0
+        full_ma = self.board.coils.full_scale_ma[axis]
+        if f"coil_short_{AXES[axis]}" in self.faults:
+            rest_ohm = self.board.coils.series_ohm + self.board.adc.coil_shunt_ohm
+            full_ma *= (rest_ohm + self.board.sensor.offset_coil_ohm) / rest_ohm
+        self.current_ma[axis] = share * full_ma
+
+    def jump_field(self, at_s: float) -> None:
+        """The ambient field steps at at_s and stays there."""
+        self.world = replace(self.world, ambient=Stepped(self.world.ambient, at_s, STEP_UT))
+        self._until_s = -1.0
+
+    @property
+    def supply_v(self) -> float:
+        """Voltage of the strap driver in V."""
+        return self.board.flip.strap_supply_v * (SUPPLY_LOW if "supply_low" in self.faults else 1.0)
+
+    @property
+    def strap_a(self) -> float:
+        """Peak of a strap pulse in A: the three straps in series across the supply."""
+        return self.supply_v / (3.0 * self.board.sensor.strap_ohm)
+
+    def volts(self, t_s: float) -> list[float]:
+        """Voltage on every input of the converter at t_s, without noise."""
+        if not t_s < self._until_s:
+            self._look_around(t_s)
+        state = (*self.magnetisation, *self.current_ma)
+        known = self._known.get(state)
+        if known is None:
+            known = self._inputs()
+            if len(self._known) < KEPT_STATES and self._until_s > t_s:
+                self._known[state] = known
+        return known
+
+    def die_field_ut(self) -> list[float]:
+        """Field along the sensitive axis of each die in µT, coils included."""
+        matrix, (ix, iy, iz) = self.coil_ut_per_ma, self.current_ma
+        return [self._field_ut[i] + matrix[i][0] * ix + matrix[i][1] * iy + matrix[i][2] * iz for i in range(3)]
+
+    def _look_around(self, t_s: float) -> None:
+        """Take field and temperature of this moment, and how long they will stay."""
+        field = self.world.field(t_s)[:, 0]
+        self._field_ut = (field if self._mount is None else self._mount @ field).tolist()
+        self.temp_c = float(self.world.temp(t_s)[0])
+        self._until_s = self.world.constant_until(t_s)
+        self._known.clear()
+
+    def _inputs(self) -> list[float]:
+        board, channels = self.board, self.board.adc.channels
+        warm = 1.0 + board.sensor.bridge_tempco_per_c * (self.temp_c - T0_C)
+        volts = [0.0] * INPUTS
+        for axis, name in enumerate(AXES):
+            volts[getattr(channels, name)] = self._bridge_v(axis, warm)
+            shunt_v = 1e-3 * self.current_ma[axis] * board.adc.coil_shunt_ohm
+            volts[getattr(channels, f"coil_{name}")] = shunt_v
+        volts[channels.bridge] = board.sensor.bridge_v * warm * board.adc.bridge_divider
+        volts[channels.supply] = self.supply_v * board.adc.supply_divider
+        return volts
+
+    def _bridge_v(self, axis: int, warm: float) -> float:
+        """The equation above, for one die; a field outside the astroid first turns its magnetisation over."""
+        world, across, along = self.world, self.die_field_ut()[axis], self._field_ut[self._easy[axis]]
+        h_k, off_c = world.anisotropy_ut[axis], self.temp_c - T0_C
+        if turns_over(across, along, h_k, self.magnetisation[axis]):
+            self.magnetisation[axis] *= -1
+        s = self.magnetisation[axis]
+        film_v = self.gain_v_per_ut[axis] * (1.0 + world.sensitivity_per_c[axis] * off_c)
+        film_v *= film_field(across, along, h_k, s) * (1.0 + s * world.flip_asymmetry[axis])
+        return s * (film_v + self._bias_v(axis)) + 1e-3 * world.offset_mv_per_v[axis] * self.board.sensor.bridge_v * warm
+
+    def _bias_v(self, axis: int) -> float:
+        world = self.world
+        bias_ut = world.bias_ut[axis] + world.bias_drift_ut[axis] + world.bias_ut_per_c[axis] * (self.temp_c - T0_C)
+        return bias_ut * self._nominal_v_per_ut() * world.gain_spread[axis]
+
+    def _nominal_v_per_ut(self) -> float:
+        return 1e-3 * self.board.sensor.sensitivity_mv_per_v_per_ut * self.board.sensor.bridge_v
+
+    def _gains(self) -> list[float]:
+        """Today's sensitivity of each bridge at zero field and 25 °C, V/µT."""
+        spread = zip(self.world.gain_spread, self.world.gain_drift, strict=True)
+        return [self._nominal_v_per_ut() * factory * today for factory, today in spread]
+
+    def truth(self, t_s: float, noise_v: Callable[[int], float]) -> dict:
+        """What is hidden: today's parameters in the units of a calibration. noise_v: V rms of one conversion by input."""
+        self.volts(t_s)
+        world, adc = self.world, self.board.adc
+        lsb_per_v = 1e3 * adc.lsb_per_mv
+        warm = [1.0 + world.sensitivity_per_c[i] * (self.temp_c - T0_C) for i in range(3)]
+        averaged = adc.samples_per_half**0.5
+        return {
+            "temp_c": self.temp_c,
+            "field_ut": world.field(t_s)[:, 0].tolist(),
+            "scale_lsb_per_ut": [self.gain_v_per_ut[i] * warm[i] * lsb_per_v for i in range(3)],
+            "bias_lsb": [self._bias_v(i) * lsb_per_v for i in range(3)],
+            "offset_lsb": [1e-3 * v * self.board.sensor.bridge_v * lsb_per_v for v in world.offset_mv_per_v],
+            "noise_lsb": [noise_v(getattr(adc.channels, name)) * lsb_per_v / averaged for name in AXES],
+            "coil_ut_per_ma": [list(row) for row in self.coil_ut_per_ma],
+            "magnetisation": list(self.magnetisation),
+            "coil_ma": list(self.current_ma),
+            "faults": sorted(self.faults),
+            "world": world,
+        }
+
+
+def mounting(world: World) -> np.ndarray | None:
+    """Soft iron, then unit vectors along the tilted sensitive axes: (3, 3), or None where both are ideal."""
+    rows = np.eye(3) + np.asarray(world.misalignment_rad)
+    if world.soft_iron == IDENTITY and np.array_equal(rows, np.eye(3)):
+        return None
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True) @ np.asarray(world.soft_iron)
+
+
+def coil_matrix(board: Board, world: World, faults: frozenset[str]) -> list[list[float]]:
+    """Field on die i in µT per mA in coil j; a shorted coil makes none."""
+    nominal = board.sensor.offset_coil_ut_per_ma
+    alive = [0.0 if f"coil_short_{axis}" in faults else 1.0 for axis in AXES]
+    return [
+        [nominal * world.coil_spread[j] * world.coil_coupling[i][j] * alive[j] for j in range(3)] for i in range(3)
+    ]
