@@ -126,7 +126,8 @@ class _Head:
 
 def _from_file(path: Path) -> ModelFile:
     tables = read_toml(path, "the model file")
-    names = tables.get("effects", [])
+    listed = tables.get("effects")
+    names = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
     settings = {name: tables.pop(name) for name in list(tables) if name in names and isinstance(tables[name], dict)}
     for name in tables:
         if name not in KEYS:

@@ -78,8 +78,9 @@ def describe(kind: type, name: str) -> str:
 
 def table_of(kind: type, name: str) -> type | None:
     """The dataclass that a field holds, None where it holds a value."""
-    inner = typing.get_type_hints(kind).get(name)
-    return inner if isinstance(inner, type) and dataclasses.is_dataclass(inner) else None
+    hint = typing.get_type_hints(kind).get(name)
+    choices = [hint, *typing.get_args(hint)]  # `Table | None` is a table that may be absent
+    return next((c for c in choices if isinstance(c, type) and dataclasses.is_dataclass(c)), None)
 
 
 def _sentence(kind: type, fault: Any, what: str, where: object, prefix: str) -> str:
