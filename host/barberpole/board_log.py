@@ -69,7 +69,13 @@ def read_board_log(data: bytes, where: object) -> BoardLog:
         notes.append("no streamed rows: the columns hold the points of the self-calibration")
     if not columns:
         raise InputError(must("the board record", "one with rows or points", "neither", where))
-    meta = {**power_up.header, "polarity": "raw", "events": [f.json for f in power_up.of[EVENT]]}
+    results = [f.json for f in power_up.of[RESULT]]
+    meta = {
+        **power_up.header,
+        "polarity": "raw",
+        "events": [f.json for f in power_up.of[EVENT]],
+        "result": results[-1] if results else None,
+    }
     return BoardLog(columns, meta, selfcal, stream.skipped + orphans + bad_points + bad_rows, tuple(notes))
 
 

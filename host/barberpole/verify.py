@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from barberpole.calibration import Calibration
+from barberpole.columns import CURRENT
 from barberpole.errors import InputError, must
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
 from barberpole.fit.residual import Problem
@@ -17,6 +18,7 @@ from barberpole.selfcal import SelfcalResult, recompute
 
 FLOAT32_PPM = 10.0  # the board computes in float32; more than this is not rounding
 WORSE = 1.5  # a residual this many times the calibration's own is a change, not chance
+DRIVEN_MA = 0.1  # of read-back current; less is the offset of its converter
 GAIN_DRIFT = 0.05  # of the factory gain, where the board's header does not give its limit
 
 
@@ -51,7 +53,8 @@ def verify(log: Log, calibration: Calibration) -> Verification:
     """Hold a log against a calibration. Raises InputError if the board ran another model, or nothing can be checked."""
     fitted = from_calibration(calibration)
     checks = [*_identity(log, calibration), *_selfcal(log, calibration, fitted)]
-    checks += _readings(log, calibration, fitted)
+    if not _coils_driven(log):
+        checks += _readings(log, calibration, fitted)
     return Verification(tuple(checks))
 
 
@@ -69,22 +72,19 @@ def _identity(log: Log, calibration: Calibration) -> Iterator[Check]:
 
 
 def _selfcal(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Check]:
-    run = log.selfcal
-    if run is None:
+    result = log.meta.get("result")
+    if result is None:
         return
-    if run.result is None:
-        yield Check("selfcal", False, "The board's self-calibration has no verdict in this log.", {})
-        return
-    accepted, codes = bool(run.result.get("accepted")), list(run.result.get("reasons", []))
+    accepted, codes = bool(result.get("accepted")), list(result.get("reasons", []))
     yield Check(
         "selfcal",
         accepted,
         "The board accepted its self-calibration." if accepted else f"The board refused its run: {sentence(codes)}",
-        {"selfcal_accepted": accepted, "selfcal_reasons": codes},
+        {"selfcal_accepted": accepted, "selfcal_reasons": codes, "in_force": result.get("in_force")},
     )
-    if calibration.selfcal is not None:
-        again = recompute(run, fitted, np.asarray(calibration.selfcal.gain_ut_per_unit))
-        yield from _gains(run.result, again)
+    if log.selfcal is not None and calibration.selfcal is not None:
+        again = recompute(log.selfcal, fitted, np.asarray(calibration.selfcal.gain_ut_per_unit))
+        yield from _gains(result, again)
 
 
 def _gains(result: dict, again: SelfcalResult) -> Iterator[Check]:
@@ -105,6 +105,12 @@ def _gains(result: dict, again: SelfcalResult) -> Iterator[Check]:
         )
 
 
+def _coils_driven(log: Log) -> bool:
+    """Whether the rows are points of a coil run, whose field is not the ambient one."""
+    currents = log.stack(CURRENT)
+    return currents is not None and bool(np.max(np.abs(currents)) > DRIVEN_MA)
+
+
 def _readings(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Check]:
     seen = _with_sensor(observations(log), fitted, log)
     magnitude = float(calibration.model.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
@@ -123,8 +129,7 @@ def _with_sensor(seen: Observations, fitted: Fitted, log: Log) -> Observations:
 
 def gains_in_force(log: Log) -> tuple[float, float, float]:
     """Today's gains over the factory's, as the board compensates with them; 1 without a self-calibration."""
-    result = (log.selfcal.result if log.selfcal else None) or {}
-    x, y, z = result.get("gain_in_force", result.get("gain") if result.get("accepted") else None) or (1.0, 1.0, 1.0)
+    x, y, z = (log.meta.get("result") or {}).get("in_force_gain") or (1.0, 1.0, 1.0)
     return float(x), float(y), float(z)
 
 
