@@ -67,7 +67,8 @@ class Ground:
         """(3, K, n) of readings -> (m, K, n) of residuals."""
         if self.normal is None:
             return columns
-        return sum(self.normal[i] * columns[i] for i in range(3))[None]
+        u, v, w = self.normal
+        return (u * columns[0] + v * columns[1] + w * columns[2])[None]
 
     def unflipped(self) -> "Ground":
         """The same with readings of unknown state taken as of one magnetisation."""
@@ -131,8 +132,9 @@ def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, 
     null = np.array([shape.inner.get(q.name, q.null) for q in params])
     wanted = np.array([q.name in shape.columns if shape.columns else not q.inner for q in params])
     typical = np.array([q.typical or 1.0 for q in params])
-    columns = np.asarray(ground.seen_through(_columns(ground, effect, null, typical, wanted, shape.secant)))
-    start = {q.name: q.first for q in params} | shape.inner
+    columns = np.asarray(ground.seen_through(_columns(ground, effect, null, typical, wanted, float(shape.secant))))
+    start = {q.name: q.null + shape.secant * t if shape.secant else q.first for q, t in zip(params, typical, strict=True)}
+    start |= shape.inner
     picked = tuple(name for name, w in zip(names, wanted, strict=True) if w)
     return Candidate(effect, setup, columns, picked, typical[wanted], not shape.secant, start, shape.tried)
 
@@ -141,11 +143,11 @@ def _columns(ground, effect, null, typical, wanted, secant) -> np.ndarray:
     """(3, K, n) for the wanted parameters."""
     picked = np.flatnonzero(wanted)
     if secant:
-        return np.stack([_secant(ground, effect, null, j, typical[j]) for j in picked], axis=1)
+        return np.stack([_secant(ground, effect, null, int(j), secant * typical[j]) for j in picked], axis=1)
     columns = _derivative(ground, effect, null)[:, picked]
     size = np.sqrt(np.sum(columns**2, axis=(0, 2))) * np.abs(typical[picked])
     for i in np.flatnonzero(size <= FLAT * size.max(initial=0.0)):
-        columns[:, i] = _secant(ground, effect, null, picked[i], typical[picked[i]])
+        columns[:, i] = _secant(ground, effect, null, int(picked[i]), typical[picked[i]])
     return columns
 
 
@@ -177,7 +179,7 @@ def _stage(ground: Ground, effect: Effect) -> int:
 
 
 def _carry(ground: Ground, path: Pathway, stage: int, columns: np.ndarray, n: int) -> np.ndarray:
-    """Columns (3, K, n), or (K, n) where parameter j acts on axis j % 3 alone, at a stage, as they reach the reading."""
+    """Columns at a stage as they reach the reading: (3, K, n), or (K, n) where parameter j acts on axis j % 3 alone."""
     terms = ground.fit.model.terms
     with_memory = [i for i in range(stage, len(terms)) if terms[i].effect.tangent]
     if not with_memory:

@@ -9,7 +9,7 @@ Fitted by Whittle's likelihood to the periodogram, best that of the sensor at re
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, rfft
+from numpy.fft import irfft, rfft
 
 EXPONENTS = np.linspace(0.5, 2.0, 16)
 CORNERS = np.geomspace(2e-4, 2.0, 49)  # cycles a sample

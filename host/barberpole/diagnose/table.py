@@ -49,7 +49,7 @@ class Design:
 
 @dataclass(frozen=True)
 class Table:
-    """Per block: Gram (B, C, C) of all columns, the last being the residual; residuals m (B,). Columns in noise units."""
+    """Per block: Gram (B, C, C) of all columns in noise units, the last being the residual; residuals m (B,)."""
 
     gram: np.ndarray
     m: np.ndarray

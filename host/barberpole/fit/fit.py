@@ -95,7 +95,7 @@ def fit_log(log: Log, file: ModelFile, extra: Sequence[Effect] = (), tick: Calla
 
 
 def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect] = (), tick=None) -> Fit:
-    """Fit the effects of a model file to observations. Raises InputError where the log lacks a column an effect needs."""
+    """Fit the effects of a model file to observations. Raises InputError where a column that it needs is not there."""
     require_columns(seen, file.effects, extra)
     seen = with_reference(seen, file)
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))

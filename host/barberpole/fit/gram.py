@@ -42,22 +42,25 @@ def block_edges(n: int) -> np.ndarray:
 
 def accumulate(problem, p: np.ndarray, sigma: float = 0.0, tick: Callable[[int], None] | None = None) -> Gram:
     """One pass over the log at parameters p. `tick` is told the samples done."""
-    size = len(p)
-    jj, jr = np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size))
-    rr, m = np.zeros(BLOCKS), np.zeros(BLOCKS)
-    edges = block_edges(problem.n)
-    for block in range(BLOCKS):
-        for rows in problem.chunks(edges[block], edges[block + 1]):
-            r, j = problem.linearise(p, rows, sigma)
-            j = j.transpose(1, 0, 2).reshape(size, -1)
-            r = r.ravel()
-            jj[block] += j @ j.T
-            jr[block] += j @ r
-            rr[block] += r @ r
-            m[block] += r.size
-            if tick:
-                tick(rows.stop - rows.start)
-    return Gram(jj, jr, rr, m)
+    size, edges = len(p), block_edges(problem.n)
+    gram = Gram(np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size)), np.zeros(BLOCKS), np.zeros(BLOCKS))
+    for rows in problem.chunks():
+        r, j = problem.linearise(p, rows, sigma)
+        for block in range(BLOCKS):
+            first, last = max(edges[block], rows.start) - rows.start, min(edges[block + 1], rows.stop) - rows.start
+            if first < last:
+                _add(gram, block, r[:, first:last], j[:, :, first:last])
+        if tick:
+            tick(rows.stop - rows.start)
+    return gram
+
+
+def _add(gram: Gram, block: int, r: np.ndarray, j: np.ndarray) -> None:
+    for residual, columns in zip(r, j, strict=True):
+        gram.jj[block] += columns @ columns.T
+        gram.jr[block] += columns @ residual
+        gram.rr[block] += residual @ residual
+        gram.m[block] += residual.size
 
 
 def heldout_rms(gram: Gram) -> float:

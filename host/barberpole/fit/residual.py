@@ -7,14 +7,15 @@ reading space: one residual a sample, of the same noise as one reading whatever 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from barberpole.chain import solve3
 from barberpole.model import Model
 from barberpole.observations import Observations
 
 CHUNK = 4096  # samples at a time: the working set stays in the cache, and memory does not grow with the log
+DIFFERENCE = 1e-6  # of a parameter's size: step of a numerical derivative
 
 
 @dataclass(frozen=True)
@@ -37,49 +38,76 @@ class Problem:
     def residuals_per_sample(self) -> int:
         return 3 if self.vector else 1
 
-    def chunks(self, start: int = 0, stop: int | None = None) -> Iterator[slice]:
-        """Slices of samples that cover [start, stop)."""
-        stop = self.n if stop is None else stop
-        for at in range(start, stop, CHUNK):
-            yield slice(at, min(at + CHUNK, stop))
+    @cached_property
+    def remembers(self) -> bool:
+        """Whether a reading depends on the field of earlier samples."""
+        return any(term.effect.tangent for term in self.model.terms)
+
+    def chunks(self) -> Iterator[slice]:
+        """Slices of samples that cover the log; one where an effect needs the whole series."""
+        size = self.n if self.model.memory else CHUNK
+        for at in range(0, self.n, size):
+            yield slice(at, min(at + size, self.n))
 
     def linearise(self, p: np.ndarray, rows: slice, sigma: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (m, k) and model derivative (m, P, k) for the k samples of `rows`; m = 3 vector, 1 scalar."""
+        """Residual (m, k) and model derivative (m, P, k) for the k samples of `rows`; m = 3 vector, 1 scalar.
+
+        sigma (LSB): noise of a reading, which lengthens the fitted field of a scalar reference a little.
+        """
         seen, at = self.seen, self.seen.at.take(rows)
         if seen.b_ut is not None:
             y, d_p, _ = self.model.linearise(seen.b_ut[:, rows], p, at)
             return seen.y[:, rows] - y, d_p
-        return self._scalar(p, rows, at, sigma)
+        if self.remembers:
+            return self._by_differences(p, rows, sigma)
+        residual, normal, d_p = self._distance(p, rows, sigma)
+        return residual[None], (normal[0] * d_p[0] + normal[1] * d_p[1] + normal[2] * d_p[2])[None]
 
-    def _scalar(self, p, rows, at, sigma):
+    def _distance(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distance (k,) of the readings from |B| = K in LSB, the unit normal there (3, k), d reading / d p."""
+        at = self.seen.at.take(rows)
         field = self.model.invert(self.seen.y[:, rows], p, at)
         _, d_p, slope = self.model.linearise(field, p, at, field_too=True)
+        cofactor, det = cofactors(np.asarray(slope))
         norm = np.sqrt(np.sum(field * field, axis=0))
-        normal = solve3(slope.transpose(1, 0, 2), field / norm)  # gradient of |B| with respect to the reading
-        steep = np.sqrt(np.sum(normal * normal, axis=0))
+        gradient = np.sum(cofactor * (field / norm), axis=1) / det  # of |B| with respect to the reading
+        steep = np.sqrt(np.sum(gradient * gradient, axis=0))
         known = self.magnitude(rows)
-        expected = known + self._noise_lengthens(slope, steep, known, sigma)
-        return ((norm - expected) / steep)[None], np.einsum("in,ipn->pn", normal / steep, d_p)[None]
+        # noise across the field lengthens it on average by its variance / 2K; unmodelled, more data do not help
+        across = np.sum(cofactor * cofactor, axis=(0, 1)) / (det * det) - steep * steep
+        return (norm - known - sigma * sigma * across / (2.0 * known)) / steep, gradient / steep, d_p
+
+    def _by_differences(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+        """The same where the fitted field of a sample depends on earlier readings: one inversion a parameter."""
+        base = self._distance(p, rows, sigma)[0]
+        sizes = [max(abs(v), abs(q.typical or 1.0)) for v, q in zip(p, self.model.params, strict=True)]
+        derivative = np.empty((len(p), base.size))
+        for j, size in enumerate(sizes):
+            step = np.zeros(len(p))
+            step[j] = DIFFERENCE * size
+            derivative[j] = (base - self._distance(p + step, rows, sigma)[0]) / step[j]
+        return base[None], derivative[None]
 
     def magnitude(self, rows: slice) -> np.ndarray | float:
         """K of each sample in µT."""
         return self.magnitude_ut if self.seen.b_mag is None else self.seen.b_mag[rows]
 
-    @staticmethod
-    def _noise_lengthens(slope, steep, known, sigma):
-        """Noise across the field lengthens it on average by its variance / 2K; unmodelled, more data do not help."""
-        if sigma == 0.0:
-            return 0.0
-        total = sum(
-            np.sum(solve3(slope, np.broadcast_to(e[:, None], steep.shape[:0] + (3, steep.size))) ** 2, axis=0)
-            for e in np.eye(3)
-        )
-        return sigma * sigma * (total - steep * steep) / (2.0 * known)
-
     def residual(self, p: np.ndarray) -> np.ndarray:
         """All residuals (m, n) in LSB."""
         seen = self.seen
         if seen.b_ut is None:
-            return np.concatenate([self.linearise(p, rows)[0] for rows in self.chunks()], axis=1)
-        parts = [seen.y[:, r] - self.model.predict(seen.b_ut[:, r], p, seen.at.take(r)) for r in self.chunks()]
+            return np.concatenate([self._distance(p, rows, 0.0)[0] for rows in self.chunks()])[None]
+        field = seen.b_ut
+        parts = [seen.y[:, r] - self.model.predict(field[:, r], p, seen.at.take(r)) for r in self.chunks()]
         return np.concatenate(parts, axis=1)
+
+
+def cofactors(m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cofactors (3, 3, n) and determinants (n,) of m (3, 3, n): the inverse transposed is cofactors / determinant."""
+    (a, b, c), (d, e, f), (g, h, i) = m
+    rows = [
+        [e * i - f * h, f * g - d * i, d * h - e * g],
+        [c * h - b * i, a * i - c * g, b * g - a * h],
+        [b * f - c * e, c * d - a * f, a * e - b * d],
+    ]
+    return np.array(rows), a * rows[0][0] + b * rows[0][1] + c * rows[0][2]

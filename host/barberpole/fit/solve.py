@@ -5,11 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from barberpole.errors import InputError
 from barberpole.fit.gram import Gram, accumulate, solve_scaled
 from barberpole.fit.residual import Problem
 
 MAX_STEPS = 40
-TOLERANCE = 1e-12  # relative fall of the cost that is still a step
+TOLERANCE = 1e-10  # relative fall of the cost that is still a step
+ROUGH = 1e-4  # the same while the noise is not yet known
+MOST_DAMPED = 1e8  # beyond it no step helps
+SAME_NOISE = 0.01  # relative change of the noise that needs no further pass
 ROUNDING = 1e-13  # of the largest reading: below this a residual is arithmetic, not data
 NOISE_BIAS_PASSES = 3  # a scalar fit needs its own noise to know how much it lengthens the field
 
@@ -26,29 +30,38 @@ class Solution:
 
 
 def minimise(problem: Problem, p: np.ndarray, free: np.ndarray, tick: Callable[[int], None] | None = None) -> Solution:
-    """Fit the `free` parameters (mask (P,)) from start p within the model's bounds."""
-    sigma, solution = 0.0, None
-    for _ in range(1 if problem.vector else NOISE_BIAS_PASSES):
-        solution = descend(problem, p, free, sigma, tick)
-        p, sigma = solution.p, solution.gram.rms()
+    """Fit the `free` parameters (mask (P,)) from start p within the model's bounds.
+
+    Raises InputError where the model cannot be evaluated at the start.
+    """
+    if problem.vector:
+        return descend(problem, p, free, 0.0, TOLERANCE, tick)
+    solution = descend(problem, p, free, 0.0, ROUGH, tick)
+    for _ in range(NOISE_BIAS_PASSES):
+        sigma = solution.gram.rms()
+        if abs(sigma - solution.sigma) <= SAME_NOISE * sigma:
+            break
+        solution = descend(problem, solution.p, free, sigma, TOLERANCE, tick)
     return solution
 
 
-def descend(problem: Problem, p: np.ndarray, free: np.ndarray, sigma: float, tick=None) -> Solution:
-    """Steps until the cost no longer falls."""
+def descend(problem: Problem, p: np.ndarray, free: np.ndarray, sigma: float, tolerance: float, tick=None) -> Solution:
+    """Steps until the cost falls by less than `tolerance` of it."""
     lower, upper = problem.model.bounds()
     floor = (ROUNDING * float(np.max(np.abs(problem.seen.y), initial=0.0))) ** 2 * problem.n
     gram, damping = accumulate(problem, p, sigma, tick), 1e-6
+    if not np.isfinite(gram.cost):
+        raise InputError("the log must stay within what the model can invert; got readings beyond it at the start")
     for _ in range(MAX_STEPS):
         movable = free & ~_held_by_bound(p, gram, lower, upper)
         step, predicted = _step(gram, movable, damping)
-        if predicted <= TOLERANCE * gram.cost + floor:
+        if predicted <= tolerance * gram.cost + floor:
             return Solution(p, gram, free, True, sigma)
         trial_p = np.clip(p + step, lower, upper)
         trial = accumulate(problem, trial_p, sigma, tick)
         if np.isfinite(trial.cost) and trial.cost < gram.cost:
             p, gram, damping = trial_p, trial, max(damping * 0.1, 1e-12)
-        elif damping > 1e8:
+        elif damping > MOST_DAMPED:
             return Solution(p, gram, free, False, sigma)
         else:
             damping = max(damping * 30.0, 1e-6)

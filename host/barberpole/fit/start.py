@@ -27,18 +27,18 @@ class Linear:
 def linear_part(seen: Observations, magnitude_ut: float) -> Linear:
     """Closed-form start: least squares against a known field, the algebraic ellipsoid against a known magnitude."""
     if seen.b_ut is not None:
-        return _against_field(seen)
+        return _against_field(seen.y, seen.b_ut)
     known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude_ut
     shape = algebraic(seen.y, known)
     return Linear(np.linalg.inv(shape.upper), shape.centre, known)
 
 
-def _against_field(seen: Observations) -> Linear:
-    columns = np.vstack([seen.b_ut, np.ones(seen.b_ut.shape[1])])
+def _against_field(y: np.ndarray, field_ut: np.ndarray) -> Linear:
+    columns = np.vstack([field_ut, np.ones(field_ut.shape[1])])
     gram = columns @ columns.T
     # directions the field never took are left out by the pseudo-inverse, for observability to name
-    answer = seen.y @ columns.T @ np.linalg.pinv(gram, rcond=1e-9, hermitian=True)
-    return Linear(answer[:, :3], answer[:, 3], float(np.max(np.abs(seen.b_ut))))
+    answer = y @ columns.T @ np.linalg.pinv(gram, rcond=1e-9, hermitian=True)
+    return Linear(answer[:, :3], answer[:, 3], float(np.max(np.abs(field_ut))))
 
 
 def start_values(model: Model, linear: Linear) -> np.ndarray:
