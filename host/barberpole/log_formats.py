@@ -29,12 +29,10 @@ def read_csv(data: bytes, where: object) -> tuple[Columns, list[str], int]:
     check_names(names, where)
     dropped: list[Any] = []
     parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(row.number) or "skip")
-    convert = pa_csv.ConvertOptions(
-        null_values=NULLS, strings_can_be_null=True, check_utf8=False, true_values=[], false_values=[]
-    )
+    convert = pa_csv.ConvertOptions(null_values=NULLS, strings_can_be_null=True, true_values=[], false_values=[])
     read = pa_csv.ReadOptions(skip_rows=1, column_names=names, use_threads=len(data) > THREADS_FROM)
     try:
-        table = pa_csv.read_csv(io.BytesIO(data), read, parse, convert)
+        table = pa_csv.read_csv(io.BytesIO(_as_utf8(data)), read, parse, convert)
     except pa.ArrowInvalid as error:
         wanted = "comma-separated rows under a line of names"
         raise InputError(must("the log", wanted, _short(error), where)) from None
@@ -85,6 +83,15 @@ def _header(data: bytes, where: object) -> list[str]:
     return names
 
 
+def _as_utf8(data: bytes) -> bytes:
+    """Damaged bytes replaced by a mark, so that the cell they are in can be shown."""
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode(errors="replace").encode()
+    return data
+
+
 def _floats(table: pa.Table, notes: list[str], where: object) -> Columns:
     """float64 columns; unknown ones that hold text are left out, with a note."""
     columns = {}
@@ -122,7 +129,7 @@ def _number(cell: Any) -> float | None:
 def _first_text(values: pa.ChunkedArray) -> tuple[int, str]:
     for row, cell in enumerate(values.to_pylist()):
         if _number(cell) is None:
-            return row, cell.decode(errors="replace") if isinstance(cell, bytes) else str(cell)
+            return row, str(cell)
     return 0, ""
 
 

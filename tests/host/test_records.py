@@ -2,10 +2,9 @@
 
 import struct
 
+from barberpole.records import Decoder, crc16, decode, encode, encode_json, parse
 from hypothesis import given
 from hypothesis import strategies as st
-
-from barberpole.records import Decoder, crc16, decode, encode, encode_json, parse
 
 PAYLOADS = st.lists(st.binary(max_size=60), min_size=1, max_size=12)
 
