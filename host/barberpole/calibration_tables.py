@@ -76,10 +76,6 @@ class SelfcalReference:
     """Id of the trajectory."""
     offset_lsb: Triple
     """LSB. Electronic offset, half of SET + RESET."""
-    ambient_ut: Triple
-    """µT. Mean field of the run: the ambient field, with what the calibration left of the bias."""
-    residual_ut: Triple
-    """µT. RMS of what the run leaves, per axis."""
     temp_c: Real
     """°C. Temperature of the run."""
 

@@ -28,10 +28,8 @@ ANY = st.floats()
 
 def example(values: tuple[float, ...] = (0.1 + 0.2, -1 / 3)) -> Calibration:
     parameters = {f"bias.{chr(97 + i)}": Value(v, abs(v), "µT") for i, v in enumerate(values)}
-    selfcal = SelfcalReference(
-        ((80.0, 0.1, 0.0), (0.0, 80.1, 0.0), (0.0, 0.0, 79.9)), (3.69, 3.69, 3.69), "ab12", (1.0, 2.0, 3.0),
-        (0.0, 0.0, 0.0), (0.01, 0.01, 0.01), 24.5,
-    )  # fmt: skip
+    response = ((80.0, 0.1, 0.0), (0.0, 80.1, 0.0), (0.0, 0.0, 79.9))
+    selfcal = SelfcalReference(response, (3.69, 3.69, 3.69), "ab12", (1.0, 2.0, 3.0), 24.5)
     return Calibration(
         model=ModelFile(("bias", "scale"), {"scale": {"shared": True}}, {"temp_c": 25.0}, sensor="hmc1021_1022"),
         parameters=parameters,
