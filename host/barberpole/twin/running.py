@@ -148,9 +148,14 @@ class Running:
         """A program that asks nothing cannot be answered with the interrupt: it gets a signal."""
         if self._interrupt_at is None or now_s < self._interrupt_at:
             return
-        self._interrupt_at, self._wire.interrupt = None, False
-        if not self._interpreter.interrupt() and self._ready:
-            self._type(CTRL_C)
+        with self._interpreter.stopped():
+            if self._wire.asks():
+                return
+            self._interrupt_at, self._wire.interrupt = None, False
+            if self._interpreter.executes():
+                self._interpreter.interrupt()
+            elif self._ready:
+                self._type(CTRL_C)
 
     def _type(self, data: bytes) -> None:
         while data:

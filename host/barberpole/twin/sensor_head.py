@@ -8,7 +8,7 @@ offset coils. A coil acts on its own die; of its neighbours' films it reaches a 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ AXES = "xyz"
 INPUTS = 8
 SUPPLY_LOW = 0.6
 STEP_UT = (1.8, -1.2, 2.4)  # ambient_step: a car passing
+PROGRAMS = ("ambient", "temperature")  # fields of World that are not numbers
 KEPT_STATES = 512  # voltages remembered while the surroundings stand still
 
 
@@ -34,7 +35,7 @@ class SensorHead:
         self._easy = tuple(AXES.index(axis) for axis in board.sensor.easy_axis)
         self._mount = mounting(world)
         self.coil_ut_per_ma = coil_matrix(board, world, faults)
-        self.gain_v_per_ut = self._gains()
+        self._nominal_v_per_ut = 1e-3 * board.sensor.sensitivity_mv_per_v_per_ut * board.sensor.bridge_v
         self._until_s = -1.0
         self._field_ut: list[float] = [0.0, 0.0, 0.0]
         self.temp_c = T0_C
@@ -73,12 +74,12 @@ class SensorHead:
         """Voltage on every input of the converter at t_s, without noise."""
         if not t_s < self._until_s:
             self._look_around(t_s)
-        state = (*self.magnetisation, *self.current_ma)
-        known = self._known.get(state)
+        known = self._known.get((*self.magnetisation, *self.current_ma))
         if known is None:
+            self._turn_over()
             known = self._inputs()
             if len(self._known) < KEPT_STATES and self._until_s > t_s:
-                self._known[state] = known
+                self._known[(*self.magnetisation, *self.current_ma)] = known
         return known
 
     def die_field_ut(self) -> list[float]:
@@ -94,53 +95,54 @@ class SensorHead:
         self._until_s = self.world.constant_until(t_s)
         self._known.clear()
 
+    def _turn_over(self) -> None:
+        """A field outside the astroid reverses a die."""
+        for i, across_ut in enumerate(self.die_field_ut()):
+            along_ut = self._field_ut[self._easy[i]]
+            if turns_over(across_ut, along_ut, self.world.anisotropy_ut[i], self.magnetisation[i]):
+                self.magnetisation[i] *= -1
+
     def _inputs(self) -> list[float]:
         board, channels = self.board, self.board.adc.channels
         warm = 1.0 + board.sensor.bridge_tempco_per_c * (self.temp_c - T0_C)
         volts = [0.0] * INPUTS
-        for axis, name in enumerate(AXES):
-            volts[getattr(channels, name)] = self._bridge_v(axis, warm)
+        for axis, (name, across_ut) in enumerate(zip(AXES, self.die_field_ut(), strict=True)):
+            volts[getattr(channels, name)] = self._bridge_v(axis, across_ut, warm)
             shunt_v = 1e-3 * self.current_ma[axis] * board.adc.coil_shunt_ohm
             volts[getattr(channels, f"coil_{name}")] = shunt_v
         volts[channels.bridge] = board.sensor.bridge_v * warm * board.adc.bridge_divider
         volts[channels.supply] = self.supply_v * board.adc.supply_divider
         return volts
 
-    def _bridge_v(self, axis: int, warm: float) -> float:
-        """The equation above, for one die; a field outside the astroid first turns its magnetisation over."""
-        world, across, along = self.world, self.die_field_ut()[axis], self._field_ut[self._easy[axis]]
-        h_k, off_c = world.anisotropy_ut[axis], self.temp_c - T0_C
-        if turns_over(across, along, h_k, self.magnetisation[axis]):
-            self.magnetisation[axis] *= -1
-        s = self.magnetisation[axis]
-        film_v = self.gain_v_per_ut[axis] * (1.0 + world.sensitivity_per_c[axis] * off_c)
-        film_v *= film_field(across, along, h_k, s) * (1.0 + s * world.flip_asymmetry[axis])
-        return s * (film_v + self._bias_v(axis)) + 1e-3 * world.offset_mv_per_v[axis] * self.board.sensor.bridge_v * warm
+    def _bridge_v(self, axis: int, across_ut: float, warm: float) -> float:
+        """The equation above, for one die; `warm` is the bridge's resistance over that at 25 °C."""
+        world, s = self.world, self.magnetisation[axis]
+        along_ut = self._field_ut[self._easy[axis]]
+        film_v = self._gain_v_per_ut(axis) * film_field(across_ut, along_ut, world.anisotropy_ut[axis], s)
+        offset_v = 1e-3 * world.offset_mv_per_v[axis] * self.board.sensor.bridge_v * warm
+        return s * (film_v * (1.0 + s * world.flip_asymmetry[axis]) + self._bias_v(axis)) + offset_v
+
+    def _gain_v_per_ut(self, axis: int) -> float:
+        """Today's sensitivity at zero field and this temperature."""
+        world, off_c = self.world, self.temp_c - T0_C
+        spread = world.gain_spread[axis] * world.gain_drift[axis]
+        return self._nominal_v_per_ut * spread * (1.0 + world.sensitivity_per_c[axis] * off_c)
 
     def _bias_v(self, axis: int) -> float:
         world = self.world
         bias_ut = world.bias_ut[axis] + world.bias_drift_ut[axis] + world.bias_ut_per_c[axis] * (self.temp_c - T0_C)
-        return bias_ut * self._nominal_v_per_ut() * world.gain_spread[axis]
-
-    def _nominal_v_per_ut(self) -> float:
-        return 1e-3 * self.board.sensor.sensitivity_mv_per_v_per_ut * self.board.sensor.bridge_v
-
-    def _gains(self) -> list[float]:
-        """Today's sensitivity of each bridge at zero field and 25 °C, V/µT."""
-        spread = zip(self.world.gain_spread, self.world.gain_drift, strict=True)
-        return [self._nominal_v_per_ut() * factory * today for factory, today in spread]
+        return bias_ut * self._nominal_v_per_ut * world.gain_spread[axis]
 
     def truth(self, t_s: float, noise_v: Callable[[int], float]) -> dict:
-        """What is hidden: today's parameters in the units of a calibration. noise_v: V rms of one conversion by input."""
+        """What is hidden, in the units of a calibration. noise_v(input) is the V rms of one conversion."""
         self.volts(t_s)
         world, adc = self.world, self.board.adc
         lsb_per_v = 1e3 * adc.lsb_per_mv
-        warm = [1.0 + world.sensitivity_per_c[i] * (self.temp_c - T0_C) for i in range(3)]
         averaged = adc.samples_per_half**0.5
         return {
             "temp_c": self.temp_c,
             "field_ut": world.field(t_s)[:, 0].tolist(),
-            "scale_lsb_per_ut": [self.gain_v_per_ut[i] * warm[i] * lsb_per_v for i in range(3)],
+            "scale_lsb_per_ut": [self._gain_v_per_ut(i) * lsb_per_v for i in range(3)],
             "bias_lsb": [self._bias_v(i) * lsb_per_v for i in range(3)],
             "offset_lsb": [1e-3 * v * self.board.sensor.bridge_v * lsb_per_v for v in world.offset_mv_per_v],
             "noise_lsb": [noise_v(getattr(adc.channels, name)) * lsb_per_v / averaged for name in AXES],
@@ -148,7 +150,7 @@ class SensorHead:
             "magnetisation": list(self.magnetisation),
             "coil_ma": list(self.current_ma),
             "faults": sorted(self.faults),
-            "world": world,
+            "parameters": {f.name: getattr(world, f.name) for f in fields(world) if f.name not in PROGRAMS},
         }
 
 
@@ -164,6 +166,4 @@ def coil_matrix(board: Board, world: World, faults: frozenset[str]) -> list[list
     """Field on die i in µT per mA in coil j; a shorted coil makes none."""
     nominal = board.sensor.offset_coil_ut_per_ma
     alive = [0.0 if f"coil_short_{axis}" in faults else 1.0 for axis in AXES]
-    return [
-        [nominal * world.coil_spread[j] * world.coil_coupling[i][j] * alive[j] for j in range(3)] for i in range(3)
-    ]
+    return [[nominal * world.coil_spread[j] * world.coil_coupling[i][j] * alive[j] for j in range(3)] for i in range(3)]

@@ -52,10 +52,10 @@ class Soldered:
             PINS.index(board.flip.reset_pin): partial(flip.pin, RESET),
             PINS.index(board.adc.reset_pin): self._adc.reset_pin,
         }
-        for chip, spi, name in ((self._adc, board.adc.spi, board.adc.cs_pin), (self._dac, board.dac.spi, board.dac.cs_pin)):
-            pin = PINS.index(name)
+        for chip, table in ((self._adc, board.adc), (self._dac, board.dac)):
+            pin = PINS.index(table.cs_pin)
             self._selected[pin] = False
-            self._buses[spi].append((pin, chip))
+            self._buses[table.spi].append((pin, chip))
             self._on_pin[pin] = partial(self._select, pin, chip)
 
     def pin(self, t_us: int, pin: int, level: int) -> None:

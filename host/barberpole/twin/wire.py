@@ -1,7 +1,9 @@
 """The interpreter's requests, decoded and answered (the format stands in shims/_twin.py)."""
 
+import contextlib
 import enum
 import os
+import select
 import struct
 from collections.abc import Callable
 
@@ -63,7 +65,7 @@ class Wire:
             answer = self._soldered.transfer(now_us, word >> 8 & 0xFF, data)[:wanted]
         elif op != Op.SYNC:
             self._on_op(Op(op))
-        self._reply(now_us, answer)
+        self._reply(now_us, answer, may_interrupt=op != Op.FLASH)  # a file system is not left half way
         return True
 
     def _rest(self, head: bytes, size: int) -> bytes:
@@ -75,12 +77,17 @@ class Wire:
             head += more
         return head
 
-    def _reply(self, now_us: int, answer: bytes) -> None:
+    def asks(self) -> bool:
+        """Whether a request waits."""
+        poll = select.poll()
+        poll.register(self.fileno, select.POLLIN)
+        return bool(poll.poll(0))
+
+    def _reply(self, now_us: int, answer: bytes, may_interrupt: bool) -> None:
         self.now_us = now_us + self._soldered.take_charge_us()
         ready_us = self._soldered.ready_at(self.now_us)
-        time_us = ~self.now_us if self.interrupt else self.now_us
-        self.interrupt = False
-        try:
+        time_us = self.now_us
+        if self.interrupt and may_interrupt:
+            time_us, self.interrupt = ~self.now_us, False
+        with contextlib.suppress(BrokenPipeError):  # killed meanwhile
             os.write(self._reply_to, _HEAD.pack(time_us, ready_us) + answer)
-        except BrokenPipeError:
-            return

@@ -1,6 +1,6 @@
 """What surrounds the emulated board and what its sensor really is: the truth that a calibration has to find.
 
-    World.of(load_board("pybv11"), hidden=("cross_field",), ambient=Stations.on_sphere(48, (30.0, 50.0), hold_s=0.5))
+>>> World.of(board, hidden=("cross_field",), ambient=Stations.on_sphere(48, (30.0, 50.0)))  # doctest: +SKIP
 
 Time runs in seconds from the board's power-up, so a log's t_s can be held against `field` and `temp` directly. Nothing
 here is shared with barberpole.effects: each hidden effect is an amplitude of the physics in `sensor_head`.

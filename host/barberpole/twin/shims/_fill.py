@@ -1,7 +1,7 @@
 # _fill.py: copies files of the PC into a flash image. Runs in a MicroPython of its own, before the board has power.
 import json
-import os
 
+import os
 import vfs
 from _flash import Flash
 

@@ -6,8 +6,9 @@
 #            each pin change as time << 16 | pin << 8 | level;  the bytes sent
 #   answer:  time in µs (its complement: Ctrl-C was pressed);  time of data-ready in µs;  the bytes wanted
 import json
-import os
 from array import array
+
+import os
 
 SYNC, SPI, FLASH, STARTED, READY, RESET = range(6)
 NEVER = 1 << 60

@@ -8,14 +8,11 @@ def _boot():
 
     import _flash
     import _twin
-    import machine
     import os
-    import pyb
-    import stm
-    import time
     import vfs
 
-    for name in ("machine", "os", "time"):
+    for name in ("machine", "os", "time", "pyb", "stm"):  # later imports find these, whatever the path is then
+        __import__(name)
         sys.modules["u" + name] = sys.modules[name]
 
     def charge():
