@@ -21,8 +21,11 @@ NONE = np.zeros((3, 0, 1))
 
 @dataclass(frozen=True)
 class Candidate:
-    """One form of an absent effect: columns (m, K, n) in LSB per parameter unit, the `names` of their parameters,
-    and what a refit in this form starts from."""
+    """One form of an absent effect: columns (m, K, n) in LSB per parameter unit and the `names` of their parameters.
+
+    start: of a refit, by name; linear: the least-squares weights are better ones. even: a parameter of no sign, whose
+    column is a secant because its derivative at the null is zero.
+    """
 
     effect: Effect
     setup: Setup
@@ -30,6 +33,7 @@ class Candidate:
     names: tuple[str, ...]
     typical: np.ndarray
     linear: bool
+    even: np.ndarray
     start: dict[str, float]
     tried: int = 1
 
@@ -132,23 +136,26 @@ def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, 
     null = np.array([shape.inner.get(q.name, q.null) for q in params])
     wanted = np.array([q.name in shape.columns if shape.columns else not q.inner for q in params])
     typical = np.array([q.typical or 1.0 for q in params])
-    columns = np.asarray(ground.seen_through(_columns(ground, effect, null, typical, wanted, float(shape.secant))))
+    columns, even = _columns(ground, effect, null, typical, wanted, float(shape.secant))
+    columns = ground.seen_through(columns)
     start = {q.name: q.null + shape.secant * t if shape.secant else q.first for q, t in zip(params, typical, strict=True)}
     start |= shape.inner
     picked = tuple(name for name, w in zip(names, wanted, strict=True) if w)
-    return Candidate(effect, setup, columns, picked, typical[wanted], not shape.secant, start, shape.tried)
+    return Candidate(effect, setup, columns, picked, typical[wanted], not shape.secant, even, start, shape.tried)
 
 
-def _columns(ground, effect, null, typical, wanted, secant) -> np.ndarray:
-    """(3, K, n) for the wanted parameters."""
+def _columns(ground, effect, null, typical, wanted, secant: float) -> tuple[np.ndarray, np.ndarray]:
+    """(3, K, n) for the wanted parameters, and which of them are even."""
     picked = np.flatnonzero(wanted)
     if secant:
-        return np.stack([_secant(ground, effect, null, int(j), secant * typical[j]) for j in picked], axis=1)
+        columns = [_secant(ground, effect, null, int(j), secant * typical[j]) for j in picked]
+        return np.stack(columns, axis=1), np.zeros(picked.size, bool)
     columns = _derivative(ground, effect, null)[:, picked]
     size = np.sqrt(np.sum(columns**2, axis=(0, 2))) * np.abs(typical[picked])
-    for i in np.flatnonzero(size <= FLAT * size.max(initial=0.0)):
+    even = size <= FLAT * size.max(initial=0.0)
+    for i in np.flatnonzero(even):
         columns[:, i] = _secant(ground, effect, null, int(picked[i]), typical[picked[i]])
-    return columns
+    return columns, even
 
 
 def _derivative(ground: Ground, effect: Effect, p: np.ndarray) -> np.ndarray:

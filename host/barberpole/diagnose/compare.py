@@ -11,6 +11,7 @@ from barberpole.diagnose.columns import Ground, ground_of
 from barberpole.diagnose.covariates import covariates
 from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.patterns import Pattern, patterns, survey
+from barberpole.diagnose.turning import AnyNoise
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
 
@@ -54,7 +55,7 @@ class Comparison:
         }
 
 
-def compare(fit: Fit, noise: Noise | None = None, extra: Sequence[Effect] = ()) -> Comparison:
+def compare(fit: Fit, noise: AnyNoise | None = None, extra: Sequence[Effect] = ()) -> Comparison:
     """What is left of the readings under a fit. `noise`: of the sensor at rest, else taken from the residual."""
     ground = ground_of(fit, extra)
     axes = axes_of(ground)
@@ -80,7 +81,7 @@ def axes_of(ground: Ground) -> tuple[str, ...]:
     return ("x", "y", "z") if ground.residual.shape[0] == 3 else ("norm",)
 
 
-def _curves(ground: Ground, noise: Noise) -> list[Curve]:
+def _curves(ground: Ground, noise: AnyNoise) -> list[Curve]:
     seen, out = ground.fit.problem.seen, []
     for covariate in covariates(seen, ground.field):
         if covariate.shapes[0] == "product" and len(covariate.basis) > 1:
@@ -101,7 +102,7 @@ def _in_its_unit(name: str, basis: np.ndarray, ground: Ground) -> np.ndarray:
     return basis if value is None else np.broadcast_to(np.asarray(value, float), basis.shape)
 
 
-def _curve(axis: str, against: str, values: np.ndarray, residual: np.ndarray, noise: Noise) -> Curve:
+def _curve(axis: str, against: str, values: np.ndarray, residual: np.ndarray, noise: AnyNoise) -> Curve:
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     count = np.maximum(np.bincount(bins), 1)
@@ -110,7 +111,7 @@ def _curve(axis: str, against: str, values: np.ndarray, residual: np.ndarray, no
     return Curve(axis, against, (np.bincount(bins, values) / count).tolist(), mean.tolist(), error.tolist())
 
 
-def _independent(noise: Noise, span: int = 100) -> float:
+def _independent(noise: AnyNoise, span: int = 100) -> float:
     """By how much correlated noise enlarges the error of a mean of `span` samples."""
     return float(np.sqrt(noise.shape(np.array([1.0 / span]))[0]))
 

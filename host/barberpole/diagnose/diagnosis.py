@@ -12,6 +12,7 @@ from barberpole.diagnose.experiments import next_experiment
 from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.patterns import Pattern, Survey, patterns, survey
 from barberpole.diagnose.search import Evidence, Found, bic_gain, search
+from barberpole.diagnose.turning import AnyNoise, turning_noise
 from barberpole.effects import Effect
 from barberpole.errors import InputError
 from barberpole.fit.fit import Fit, fit_observations
@@ -23,6 +24,7 @@ from barberpole.sensor import Sensor
 GEOMETRY = 30.0  # condition number of the linear part above which nothing is named (full turns: below 6)
 BLIND = 0.05  # of an effect's RMS left by the baseline: below it this log cannot see the effect
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
+SLOWEST = 8  # periods a record: below this the residual has lost power to the fit
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
 LINEAR = ("bias", "scale", "misalignment")
 
@@ -119,14 +121,17 @@ def _geometry(fit: Fit) -> str:
     return ""
 
 
-def _noise(fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[Effect]) -> Noise:
+def _noise(fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[Effect]) -> AnyNoise:
     """From a record at rest, else from what no effect and no covariate explains."""
-    if rest is not None:
-        noise = estimate(rest.y, "rest")
-        return noise if fit.problem.vector else replace(noise, white=noise.white.mean(keepdims=True))
     ground = ground_of(fit, extra)
-    left = _unexplained_residual(ground, [s.columns for s in candidates(ground, absent)])
-    return estimate(left, "residual", slowest=8)
+    if rest is None:
+        left = _unexplained_residual(ground, [c.columns for c in candidates(ground, absent)])
+        noise = estimate(left, "residual", SLOWEST, ground.normal)
+    else:
+        noise = estimate(rest.y, "rest")
+    if ground.normal is None:
+        return noise
+    return turning_noise(noise, ground.normal) if noise.coloured else noise.common()
 
 
 def _unexplained_residual(ground: Ground, known: list[np.ndarray]) -> np.ndarray:

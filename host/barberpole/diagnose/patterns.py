@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from barberpole.diagnose.columns import Ground
 from barberpole.diagnose.covariates import Covariate, covariates, ripples
-from barberpole.diagnose.noise import Noise
+from barberpole.diagnose.turning import AnyNoise
 from barberpole.diagnose.table import Design, Projection, Table, project, tabulate
 
 SHOWN = 12  # patterns listed at most
@@ -34,7 +34,7 @@ class Survey:
     projection: Projection
     design: Design
     places: list[tuple[int, Covariate, np.ndarray]]
-    noise: Noise
+    noise: AnyNoise
 
     @property
     def everything(self) -> np.ndarray:
@@ -50,7 +50,7 @@ class Survey:
         return self.design.combine(weights)
 
 
-def survey(ground: Ground, noise: Noise, known: Sequence[np.ndarray] = ()) -> Survey:
+def survey(ground: Ground, noise: AnyNoise, known: Sequence[np.ndarray] = ()) -> Survey:
     """Residual of a fit against all covariates, with the baseline (and `known` columns) projected off."""
     seen = ground.fit.problem.seen
     channels = ground.residual.shape[0]

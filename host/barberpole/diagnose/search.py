@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from barberpole.diagnose.candidates import Absent, candidates
 from barberpole.diagnose.columns import Candidate, Ground, ground_of
-from barberpole.diagnose.noise import Noise
+from barberpole.diagnose.turning import AnyNoise
 from barberpole.diagnose.table import Design, Projection, Table, heldout, project, tabulate
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit, refit
@@ -30,7 +30,7 @@ class Evidence:
     baseline: np.ndarray
     table: Table
     projection: Projection
-    noise: Noise
+    noise: AnyNoise
 
     def gain(self, columns: np.ndarray, forms: int = 1) -> float:
         """Gain in BIC by these columns."""
@@ -63,7 +63,7 @@ def p_value(evidence: Evidence, columns: np.ndarray) -> float:
     return float(max(chi2.sf(score / left, rank), 1e-300)) if rank else 1.0
 
 
-def examine(fit: Fit, absent: Absent, noise: Noise, extra: Sequence[Effect] = ()) -> Evidence:
+def examine(fit: Fit, absent: Absent, noise: AnyNoise, extra: Sequence[Effect] = ()) -> Evidence:
     """The Gram matrix of a fit, its absent effects and its residual."""
     ground = ground_of(fit, extra)
     shapes = candidates(ground, absent)
@@ -75,7 +75,7 @@ def examine(fit: Fit, absent: Absent, noise: Noise, extra: Sequence[Effect] = ()
     return Evidence(fit, ground, shapes, places, baseline, table, project(table, baseline), noise)
 
 
-def search(fit: Fit, absent: Absent, noise: Noise, extra: Sequence[Effect] = ()) -> tuple[list[Found], Evidence]:
+def search(fit: Fit, absent: Absent, noise: AnyNoise, extra: Sequence[Effect] = ()) -> tuple[list[Found], Evidence]:
     """Effects in the order found, and the evidence at the end."""
     evidence, found = examine(fit, absent, noise, extra), []
     while len(found) < MOST:
@@ -122,11 +122,12 @@ def _refitted(evidence: Evidence, at: int) -> Fit:
     start = {f"{name}.{key}": value for key, value in shape.start.items()}
     if shape.linear:
         weights = evidence.projection.weights(evidence.places[at])[0]
+        weights = np.where(shape.even, np.sqrt(np.abs(weights * shape.typical)), weights)
         start |= {f"{name}.{key}": float(w) for key, w in zip(shape.names, weights, strict=True)}
     return refit(evidence.fit, evidence.fit.setups | {name: shape.setup}, start)
 
 
-def _after(fit: Fit, noise: Noise, extra: Sequence[Effect]) -> tuple[float, np.ndarray]:
+def _after(fit: Fit, noise: AnyNoise, extra: Sequence[Effect]) -> tuple[float, np.ndarray]:
     """Whitened residual sum of squares of an exact fit, and its held-out sums by fold."""
     ground = ground_of(fit, extra)
     design = Design(ground.residual.shape[0])

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.diagnose.noise import Noise
+from barberpole.diagnose.turning import AnyNoise
 from barberpole.fit.gram import BLOCKS, FOLDS, block_edges
 
 SEEN = 2.5e-3  # of a column's energy that must survive the baseline: 5 % of its RMS
@@ -63,7 +63,7 @@ class Table:
         return float(self.m.sum())
 
 
-def tabulate(design: Design, noise: Noise) -> Table:
+def tabulate(design: Design, noise: AnyNoise) -> Table:
     """Whiten every column and accumulate. The residual must have been added last."""
     gram = np.zeros((BLOCKS, design.count, design.count))
     m = np.zeros(BLOCKS)
