@@ -1,0 +1,167 @@
+"""`barberpole build`: one folder with all that a board needs, whole or not at all.
+
+src/*.py        firmware and generated modules as text
+mpy/*.mpy       compiled for the board
+romfs.img       the same as a ROMFS image
+manifest.py     the same for freezing
+budget.json     flash, RAM and time
+build.json      hashes, and which file goes where on the board
+"""
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from barberpole import paths
+from barberpole.board import Board, load_board
+from barberpole.calibration import Calibration, read_calibration
+from barberpole.errors import InputError, LimitError, must
+
+from barberpole_codegen import budget, image
+from barberpole_codegen.modules import VERSION, Generated, generate
+from barberpole_codegen.narrow import Precision
+
+FORMAT = 1
+GENERATED = ("bp_board", "bp_trajectory", "bp_calibration")
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class BuildResult:
+    """What was built. `files`: path in the folder -> path on the board, relative to its working folder."""
+
+    folder: Path
+    board: str
+    model: str
+    calibration: str
+    trajectory: str
+    files: dict[str, str]
+    precision: dict[str, Precision]
+    budget: dict[str, Any]
+
+
+def build(
+    board: str | Path | Board,
+    calibration: str | Path | Calibration,
+    out_dir: str | Path,
+    progress: Progress | None = None,
+) -> BuildResult:
+    """Build for a board (name, path or object) with a calibration (path or object) into `out_dir`.
+
+    `out_dir` is new, empty, or a former build, which is replaced. Raises InputError or LimitError; then nothing
+    changed.
+    """
+    say = progress or (lambda _: None)
+    board = board if isinstance(board, Board) else load_board(board)
+    calibration = calibration if isinstance(calibration, Calibration) else read_calibration(calibration)
+    out_dir = Path(out_dir)
+    _require_replaceable(out_dir)
+    say("tracing the compensation and checking it in float32")
+    made = generate(board, calibration)
+    sources = {**image.firmware_sources(paths.firmware()), **made.texts}
+    say(f"compiling {len(sources) - 1} modules")
+    compiled = {
+        name.replace(".py", ".mpy"): image.compile_module(name, text)
+        for name, text in sorted(sources.items())
+        if name != image.MAIN
+    }
+    say("packing the image and measuring its cost")
+    rom = image.romfs_image(compiled)
+    costs = _costs(board, made, sources, compiled, rom)
+    files = {f"mpy/{name}": f"lib/{name}" for name in compiled} | {f"src/{image.MAIN}": image.MAIN}
+    result = BuildResult(
+        out_dir, board.name, calibration.model.hash, calibration.hash, made.table.id, files, made.precision, costs
+    )
+    content = _content(sources, compiled, rom, costs)
+    content["build.json"] = _json(_describe(result, content))
+    _write(out_dir, content)
+    say(f"built {out_dir}")
+    return result
+
+
+def _require_replaceable(folder: Path) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise InputError(must("the output", "a folder", "a file", folder))
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / "build.json").exists():
+        raise InputError(must("the output", "a new or empty folder, or a former build", "a folder with files", folder))
+
+
+def _costs(
+    board: Board, made: Generated, sources: dict[str, str], compiled: dict[str, bytes], rom: bytes
+) -> dict[str, Any]:
+    """budget.json. Raises LimitError where the files exceed the board's file system."""
+    flash = budget.flash_bytes({**compiled, image.MAIN: sources[image.MAIN].encode()})
+    if flash["total"] > board.filesystem_kib * 1024:
+        limit = f"at most {board.filesystem_kib} KiB (filesystem_kib)"
+        raise LimitError(must("the build", limit, f"{flash['total'] / 1024:.0f} KiB", board.name))
+    return {
+        "flash_bytes": flash,
+        "romfs_bytes": len(rom),
+        "ram_on_import_bytes": budget.ram_on_import(rom, list(GENERATED)),
+        "ram_source": "gc.mem_free around each import from ROMFS, 64-bit unix interpreter; a board needs about half",
+        "points_bytes": 54 * made.table.points,
+        "time_us": budget.times_us(made.programs, board),
+        "float_operations": {name: sum(p.count().values()) for name, p in made.programs.items()},
+        "float32_error_of_full_scale": {name: p.fraction for name, p in made.precision.items()},
+    }
+
+
+def _content(
+    sources: dict[str, str], compiled: dict[str, bytes], rom: bytes, costs: dict[str, Any]
+) -> dict[str, bytes]:
+    content = {f"src/{name}": text.encode() for name, text in sources.items()}
+    content |= {f"mpy/{name}": data for name, data in compiled.items()}
+    names = [name for name in sources if name != image.MAIN]
+    content |= {"romfs.img": rom, "manifest.py": image.manifest(names).encode(), "budget.json": _json(costs)}
+    return content
+
+
+def _describe(result: BuildResult, content: dict[str, bytes]) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "generator": f"barberpole_codegen {VERSION}",
+        "board": result.board,
+        "model": result.model,
+        "calibration": result.calibration,
+        "trajectory": result.trajectory,
+        "files": [
+            {"source": source, "target": target, "bytes": len(content[source]), "sha256": _sha256(content[source])}
+            for source, target in sorted(result.files.items())
+        ],
+        "romfs": {"source": "romfs.img", "bytes": len(content["romfs.img"]), "sha256": _sha256(content["romfs.img"])},
+    }
+
+
+def _write(folder: Path, content: dict[str, bytes]) -> None:
+    """The whole folder beside its place, then moved there; a former build is moved away first and put back on error."""
+    beside = folder.with_name(f"{folder.name}.tmp-{os.getpid()}")
+    old = folder.with_name(f"{folder.name}.old-{os.getpid()}")
+    try:
+        for name, data in content.items():
+            path = beside / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        if folder.exists():
+            folder.rename(old)
+        beside.rename(folder)
+    except OSError as error:
+        if old.exists() and not folder.exists():
+            old.rename(folder)
+        raise InputError(must("the output folder", "one that can be written", error.strerror, folder)) from None
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _json(value: Any) -> bytes:
+    return (json.dumps(value, indent=1, sort_keys=True) + "\n").encode()
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

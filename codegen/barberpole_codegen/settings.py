@@ -1,0 +1,183 @@
+"""Board, trajectory and calibration as the constants of the generated modules. No syntax here, only values."""
+
+import hashlib
+import math
+
+import numpy as np
+from barberpole.board import Board
+from barberpole.calibration import Calibration
+from barberpole.trajectory import CodeTable
+
+from barberpole_codegen.emit import Constant, literal
+
+SUPPLY_FRACTION = 0.95  # below this the pulse is weaker than the board was designed for
+WIDE_DRIFT = 0.5  # without a factory reference gains are compared with nominal parts only
+RESIDUALS = 3.0  # a coil run may be this much worse than the calibration was when it was fitted
+EARTH_UT = 50.0  # a typical ambient field, on top of which the coils are driven
+CURVATURE = 3  # the lowest odd power a bridge's law can miss
+FIRST_RATIO = 128  # oversampling ratio of code 0; each code doubles it
+MODULATOR_HZ = 4096000  # of the ADS131M08 at 8.192 MHz
+T0_C = 25.0  # at which the sensor file gives the bridge resistance
+
+
+def board_constants(board: Board) -> list[Constant]:
+    """What is soldered, in the firmware's units; the last constant is the hash of all others."""
+    constants = [*_names(board), *_flip(board), *_adc(board), *_dac(board), *_selfcal(board)]
+    return [*constants, Constant("HASH", digest(constants), "of all of the above")]
+
+
+def trajectory_constants(table: CodeTable) -> list[Constant]:
+    """The run of coil currents."""
+    return [
+        Constant("ID", table.id),
+        Constant("NAME", table.name),
+        Constant("POINTS", table.points),
+        Constant("BLOCK", table.block, "points after which every axis has seen the same mean square; 0: never"),
+        Constant("UNIT_MA", narrowed(table.unit_ma), "mA of a current of 1"),
+        Constant("CODES", table.bytes, "uint16, little-endian: x y z of each point"),
+    ]
+
+
+def calibration_constants(calibration: Calibration, board: Board, table: CodeTable) -> list[Constant]:
+    """What was fitted, and by what a run is judged."""
+    factory = factory_response(calibration, board, table)
+    drift = board.selfcal.gain_drift_limit if calibration.selfcal else WIDE_DRIFT
+    return [
+        Constant("MODEL", calibration.model.hash, "the effects and their settings"),
+        Constant("CALIBRATION", calibration.hash),
+        Constant("BOARD", digest(board_constants(board)[:-1]), "bp_board.HASH that this belongs to"),
+        Constant("TRAJECTORY", table.id, "bp_trajectory.ID that this belongs to"),
+        Constant("EFFECTS", tuple(calibration.model.effects)),
+        Constant("HAS_FACTORY_REFERENCE", bool(calibration.selfcal)),
+        Constant("FACTORY_GAIN_UT_PER_UNIT", tuple(narrowed(row) for row in factory), "row: axis, column: coil"),
+        Constant("GAIN_DRIFT_LIMIT", narrowed((drift,))[0], "of a gain over the factory's"),
+        Constant("RESIDUAL_LIMIT_UT", narrowed((residual_limit_ut(calibration, board),))[0], "rms of a run"),
+    ]
+
+
+def factory_response(calibration: Calibration, board: Board, table: CodeTable) -> np.ndarray:
+    """(3, 3) µT per trajectory unit: the factory's coil run, or nominal parts where there was none.
+
+    The factory may have used another unit of current than this table.
+    """
+    reference = calibration.selfcal
+    if reference is None:
+        return np.diag(board.sensor.offset_coil_ut_per_ma * np.asarray(table.unit_ma))
+    return np.asarray(reference.gain_ut_per_unit) * (np.asarray(table.unit_ma) / np.asarray(reference.units_ma))
+
+
+def residual_limit_ut(calibration: Calibration, board: Board) -> float:
+    """Largest believable residual rms of a coil run, µT.
+
+    `residual_sigma` times the noise of a point; but a calibration cannot claim to be better on the board than it was
+    when it was fitted, so three times its own residual is believed too. What of that was not noise is missing
+    physics, and grows with the third power of the field where the run goes further than the log went.
+    """
+    residual, scale = calibration.residual, board.scale_lsb_per_ut
+    noise_lsb = residual.noise_lsb or 0.0
+    missing_ut = math.sqrt(max(residual.rms_lsb**2 - noise_lsb**2, 0.0)) / scale
+    largest_ut = EARTH_UT + max(board.selfcal.radii_ut)
+    further = max(largest_ut / (calibration.validity.b_max_ut or largest_ut), 1.0)
+    noise_ut = board.selfcal.residual_sigma * point_noise_ut(calibration, board)
+    return max(noise_ut, RESIDUALS * max(residual.rms_lsb / scale, missing_ut * further**CURVATURE))
+
+
+def point_noise_ut(calibration: Calibration, board: Board) -> float:
+    """Noise of one point, µT: that of the sensor file, or that of the calibration's log if larger.
+
+    White noise n averaged over T has the deviation n / sqrt(2 T); SET and RESET are averaged, and so are cycles.
+    """
+    seconds = 2.0 * board.selfcal.cycles_per_point * board.adc.samples_per_half / board.adc.sample_hz
+    from_sensor = 1e-3 * board.sensor.noise_nt_per_rthz / math.sqrt(2.0 * seconds)
+    return max(from_sensor, (calibration.residual.noise_lsb or 0.0) / board.scale_lsb_per_ut)
+
+
+def digest(constants: list[Constant]) -> str:
+    """12 hex digits that change with any constant."""
+    text = "\n".join(f"{c.name} = {literal(c.value)}" for c in constants)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def narrowed(values) -> tuple[float, ...]:
+    """As float32 holds them."""
+    return tuple(float(np.float32(v)) for v in values)
+
+
+def _names(board: Board) -> list[Constant]:
+    return [
+        Constant("BOARD", board.name),
+        Constant("SENSOR", board.sensor.name),
+        Constant("SHIELDED", bool(board.shielded), "powers up in a shield: the ambient field is known to be zero"),
+    ]
+
+
+def _flip(board: Board) -> list[Constant]:
+    flip = board.flip
+    return [
+        Constant("SET_PIN", flip.set_pin),
+        Constant("RESET_PIN", flip.reset_pin),
+        Constant("PULSE_US", round(flip.pulse_us)),
+        Constant("SETTLE_US", round(flip.settle_us), "from a pulse to the first sample"),
+        Constant("HALF_US", round(0.5e6 / flip.rate_hz), "half a flip cycle"),
+    ]
+
+
+def _adc(board: Board) -> list[Constant]:
+    adc, sensor = board.adc, board.sensor
+    lsb_per_v = float(1 << (adc.bits - 1)) / adc.vref_v
+    bridge_v = sensor.bridge_v * adc.bridge_divider
+    c_per_v = 1.0 / (sensor.bridge_tempco_per_c * bridge_v)
+    c = adc.channels
+    channels = (c.x, c.y, c.z, c.bridge, c.coil_x, c.coil_y, c.coil_z, c.supply)
+    gain1, gain2 = _gain_registers(adc.pga, channels[:3])
+    ratio = round(math.log2(MODULATOR_HZ / adc.sample_hz / FIRST_RATIO))
+    per_lsb = {
+        "TEMP_AT_0_C": (T0_C - c_per_v * bridge_v, "bridge temperature for a code of 0"),
+        "TEMP_C_PER_LSB": (c_per_v / lsb_per_v, "the bridge's resistance at a constant current is the thermometer"),
+        "COIL_MA_PER_LSB": (1000.0 / (adc.coil_shunt_ohm * lsb_per_v), ""),
+        "SUPPLY_V_PER_LSB": (1.0 / (adc.supply_divider * lsb_per_v), ""),
+        "SUPPLY_MIN_V": (SUPPLY_FRACTION * board.flip.strap_supply_v, "of the flip pulses"),
+        "LSB_PER_V": (lsb_per_v * adc.pga, "at the bridge"),
+    }
+    return [
+        Constant("ADC_SPI", adc.spi),
+        Constant("ADC_BAUD", adc.baud),
+        Constant("ADC_CS_PIN", adc.cs_pin),
+        Constant("ADC_DRDY_PIN", adc.drdy_pin),
+        Constant("ADC_RESET_PIN", adc.reset_pin),
+        Constant("ADC_RATIO_CODE", ratio, f"{adc.sample_hz:g} conversions a second"),
+        Constant("ADC_GAIN1", gain1, "channels 0 to 3"),
+        Constant("ADC_GAIN2", gain2, "channels 4 to 7"),
+        Constant("ADC_CHANNELS", channels, "x y z bridge coil_x coil_y coil_z supply"),
+        Constant("SAMPLES_PER_HALF", adc.samples_per_half),
+        *(Constant(name, narrowed((value,))[0], comment) for name, (value, comment) in per_lsb.items()),
+    ]
+
+
+def _gain_registers(pga: int, bridges: tuple[int, ...]) -> tuple[int, int]:
+    """GAIN1 and GAIN2: four channels each, four bits a channel, the code is log2 of the gain; gain 1 elsewhere."""
+    code = pga.bit_length() - 1
+    both = sum(code << (4 * channel) for channel in bridges)
+    return both & 0xFFFF, both >> 16
+
+
+def _dac(board: Board) -> list[Constant]:
+    dac = board.dac
+    return [
+        Constant("DAC_SPI", dac.spi),
+        Constant("DAC_BAUD", dac.baud),
+        Constant("DAC_CS_PIN", dac.cs_pin),
+        Constant("DAC_GAIN", dac.gain),
+        Constant("DAC_CHANNELS", (dac.channels.coil_x, dac.channels.coil_y, dac.channels.coil_z)),
+        Constant("FULL_SCALE_MA", narrowed(board.coils.full_scale_ma), "coil current at the end of the scale"),
+    ]
+
+
+def _selfcal(board: Board) -> list[Constant]:
+    run = board.selfcal
+    return [
+        Constant("SETTLE_CYCLES", run.settle_cycles, "dropped after each new current"),
+        Constant("CYCLES_PER_POINT", run.cycles_per_point),
+        Constant("CURRENT_TOLERANCE", narrowed((run.current_tolerance,))[0]),
+        Constant("AMBIENT_STEP_LIMIT_UT", narrowed((run.ambient_step_limit_ut,))[0]),
+    ]
