@@ -1,0 +1,43 @@
+# bp_dac80504.py: four 16-bit voltages from the DAC80504.
+# Frames of 24 bits: read flag and register, then 16 bits of data, most significant first; mode 1.
+# write() allocates nothing. Fit the version that wakes at half scale (DAC80504M): half scale is no coil current.
+from micropython import const
+
+import bp_reasons as reasons
+
+_REG_ID = const(0x01)
+_REG_GAIN = const(0x04)
+_REG_DAC0 = const(0x08)
+_READ = const(0x80)
+_ID = const(0x04)  # high byte of DEVICE ID: 16 bits, four channels
+_GAIN_2 = const(0x000F)  # every output twice the reference
+
+
+class Dac80504:
+    def __init__(self, spi, cs):
+        self._spi = spi
+        self._cs = cs
+        self._out = bytearray(3)
+        self._in = bytearray(3)
+
+    def start(self, gain):  # 1 or 2: output range in units of the reference
+        if self._read(_REG_ID) >> 8 != _ID:
+            raise reasons.Fault(reasons.WRONG_CHIP, "no DAC80504 on the bus")
+        self._transfer(_REG_GAIN, _GAIN_2 if gain == 2 else 0)
+
+    def write(self, channel, code):
+        self._transfer(_REG_DAC0 + channel, code)
+
+    def _read(self, register):  # the answer comes with the frame that follows
+        self._transfer(_READ | register, 0)
+        self._transfer(0, 0)
+        return self._in[1] << 8 | self._in[2]
+
+    def _transfer(self, register, data):
+        out = self._out
+        out[0], out[1], out[2] = register, data >> 8, data & 0xFF
+        self._cs.value(0)
+        try:
+            self._spi.write_readinto(out, self._in)
+        finally:
+            self._cs.value(1)

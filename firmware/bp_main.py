@@ -1,0 +1,158 @@
+# bp_main.py: power-up. Self-test, load what was in force, self-calibrate, judge, store, then stream.
+# The only file that knows `machine`; it makes the pins and the buses and hands them on. Ctrl-C ends it at any time:
+# coils at zero, flip pins low, back to the REPL without a word.
+import binascii
+import os
+import sys
+import time
+
+import machine
+
+import bp_board as board
+import bp_calibration as calibration
+import bp_reasons as reasons
+import bp_records as records
+import bp_report as report
+import bp_selfcal
+import bp_store
+import bp_trajectory as trajectory
+from bp_ads131m08 import Ads131m08
+from bp_coils import Coils
+from bp_compensate import Compensator
+from bp_dac80504 import Dac80504
+from bp_flip import Flip
+from bp_sampler import Sampler
+
+FOLDER = "bp"  # below the working folder: /flash on a pyboard, / elsewhere
+RUN_FILE = FOLDER + "/run.bpr"
+
+
+class Hardware:
+    def __init__(self):
+        set_pin = _output(board.SET_PIN, 0)
+        reset_pin = _output(board.RESET_PIN, 0)
+        self.flip = Flip(set_pin, reset_pin, board.PULSE_US, machine.disable_irq, machine.enable_irq)
+        dac_bus = machine.SPI(board.DAC_SPI, baudrate=board.DAC_BAUD, polarity=0, phase=1)
+        self.dac = Dac80504(dac_bus, _output(board.DAC_CS_PIN, 1))
+        self.coils = Coils(self.dac, board.DAC_CHANNELS, board.FULL_SCALE_MA)
+        adc_bus = machine.SPI(board.ADC_SPI, baudrate=board.ADC_BAUD, polarity=0, phase=1)
+        drdy = machine.Pin(board.ADC_DRDY_PIN, machine.Pin.IN)
+        self.adc = Ads131m08(adc_bus, _output(board.ADC_CS_PIN, 1), drdy, _output(board.ADC_RESET_PIN, 1))
+        self.sampler = Sampler(self.adc, self.flip, board)
+        self.compensator = Compensator(board, calibration)
+
+    def off(self):
+        self.flip.off()
+        self.coils.zero()
+
+
+class Clock:  # microseconds since it was made, from ticks that wrap
+    def __init__(self):
+        self._ticks = time.ticks_us()
+        self._us = 0
+
+    def at_us(self, ticks):
+        self._us += time.ticks_diff(ticks, self._ticks)
+        self._ticks = ticks
+        return self._us
+
+    def now_s(self):
+        return self.at_us(time.ticks_us()) / 1000000
+
+
+def run():
+    hardware = Hardware()
+    writer = records.Writer(sys.stdout.buffer.write)
+    clock = Clock()
+    try:
+        if power_up(hardware, writer, clock):
+            stream(hardware, writer, clock)
+    except KeyboardInterrupt:
+        return
+    finally:
+        hardware.off()
+
+
+def power_up(hardware, writer, clock):  # False where no samples can be had
+    head = report.header(binascii.hexlify(machine.unique_id()).decode(), bp_store.next_boot(FOLDER))
+    writer.json(records.HEADER, head)
+    store = bp_store.Store(FOLDER, calibration.CALIBRATION)
+    held = store.load()
+    notes = _notes(store)
+    codes, can_sample, detail = self_test(hardware)
+    begin_s = clock.now_s()
+    result = None
+    if not codes:
+        result = _self_calibrate(hardware, writer, clock)
+        codes, detail = result.reasons, result.detail
+        if result.solution is not None and not codes and calibration.HAS_FACTORY_REFERENCE:
+            held = store.save(result.solution.gain, _shift_ut(result.solution), result.offset_lsb, result.temp_c())
+    hardware.compensator.gain = tuple(held.gain)
+    hardware.compensator.shift_ut = tuple(held.shift_ut)
+    if not calibration.HAS_FACTORY_REFERENCE:
+        codes = codes + [reasons.NO_FACTORY_REFERENCE]
+    verdict = report.verdict(codes, held, result)
+    events = notes + codes
+    bp_store.replace(RUN_FILE, lambda file: report.write_run(file, head, begin_s, result, verdict, events))
+    for code in events:
+        report.event(writer, begin_s, code, detail)
+    writer.json(records.RESULT, verdict)
+    return can_sample
+
+
+def self_test(hardware):  # codes of what forbids a self-calibration, whether samples can be had, and a detail
+    try:
+        hardware.adc.start(board.ADC_RATIO_CODE, board.ADC_GAIN1, board.ADC_GAIN2)
+        hardware.dac.start(board.DAC_GAIN)
+        hardware.sampler.clear()
+        hardware.sampler.cycle()
+        hardware.sampler.check()
+    except reasons.Fault as fault:
+        return [fault.code], fault.code == reasons.SATURATED, fault.detail
+    found = []
+    if hardware.compensator.supply_v(hardware.sampler) < board.SUPPLY_MIN_V:
+        found.append(reasons.SUPPLY_LOW)
+    if calibration.BOARD != board.HASH or calibration.TRAJECTORY != trajectory.ID:
+        found.append(reasons.MODEL_MISMATCH)
+    return found, True, ""
+
+
+def stream(hardware, writer, clock):  # a row a cycle until Ctrl-C, or until the converter falls silent
+    sampler = hardware.sampler
+    clipped = 0
+    while True:
+        sampler.clear()
+        try:
+            sampler.cycle()
+        except reasons.Fault as fault:
+            report.event(writer, clock.now_s(), fault.code, fault.detail)
+            return
+        if sampler.clipped and not clipped:
+            report.event(writer, clock.now_s(), reasons.SATURATED)
+        clipped = sampler.clipped
+        writer.frame(records.ROW, report.row(sampler, hardware.compensator, clock.at_us(sampler.mid_us)))
+
+
+def _output(name, value):
+    return machine.Pin(name, machine.Pin.OUT, value=value)
+
+
+def _self_calibrate(hardware, writer, clock):
+    try:
+        return bp_selfcal.run(hardware.sampler, hardware.coils, hardware.compensator, trajectory, calibration, board)
+    except KeyboardInterrupt:
+        report.event(writer, clock.now_s(), reasons.INTERRUPTED)
+        raise
+
+
+def _notes(store):  # codes of what is worth knowing and forbids nothing
+    found = []
+    if store.corrupt:
+        found.append(reasons.STORE_CORRUPT)
+    if any(name.startswith("bp_") for name in os.listdir()):
+        found.append(reasons.SHADOWED)
+    return found
+
+
+def _shift_ut(solution):  # only a shielded run knows it
+    return calibration.in_frame(*solution.ambient_ut) if board.SHIELDED else (0.0, 0.0, 0.0)
