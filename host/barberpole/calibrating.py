@@ -8,7 +8,7 @@ import numpy as np
 from barberpole.adding import noise_from_differences
 from barberpole.board_log import SelfcalRun
 from barberpole.calibration import Calibration
-from barberpole.calibration_tables import Residual, SelfcalReference, Step, Validity, Value
+from barberpole.calibration_tables import Residual, Step, Validity, Value
 from barberpole.fit.fit import Fit
 from barberpole.fitted import from_calibration
 from barberpole.log import Log
@@ -72,22 +72,10 @@ def with_selfcal(calibration: Calibration, run: SelfcalRun, sensor: Sensor) -> C
     """
     from barberpole.selfcal import factory_reference  # here: selfcal stands on fitted models, as this module does
 
-    found = factory_reference(run, from_calibration(calibration), sensor.offset_coil_ut_per_ma)
-    reference = SelfcalReference(
-        gain_ut_per_unit=_matrix(found["gain_ut_per_unit"]),
-        units_ma=_triple(found["units_ma"]),
-        trajectory=str(found["trajectory"]),
-        offset_lsb=_triple(found["offset_lsb"]),
-        temp_c=float(found["temp_c"]),
-    )
+    reference = factory_reference(run, from_calibration(calibration), sensor.offset_coil_ut_per_ma)
     return replace(calibration, selfcal=reference)
 
 
 def _triple(values) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in values)
-    return x, y, z
-
-
-def _matrix(rows) -> tuple[tuple[float, float, float], ...]:
-    x, y, z = (_triple(row) for row in rows)
     return x, y, z
