@@ -2,24 +2,50 @@
 
 from collections.abc import Sequence
 
+from barberpole.effects.adc_inl import ADC_INL
 from barberpole.effects.bias import BIAS
 from barberpole.effects.bias_temperature import BIAS_TEMPERATURE
+from barberpole.effects.coil_coupling import COIL_COUPLING
+from barberpole.effects.coil_heating import COIL_HEATING
 from barberpole.effects.cross_field import CROSS_FIELD
+from barberpole.effects.cubic import CUBIC
+from barberpole.effects.drift import DRIFT
 from barberpole.effects.effect import Conditions, Effect, Param, Setup, Shape
 from barberpole.effects.flip_asymmetry import FLIP_ASYMMETRY
+from barberpole.effects.hysteresis import HYSTERESIS
+from barberpole.effects.lag import LAG
+from barberpole.effects.load_current import LOAD_CURRENT
+from barberpole.effects.mains import MAINS
 from barberpole.effects.misalignment import MISALIGNMENT
+from barberpole.effects.outliers import OUTLIERS
+from barberpole.effects.quadratic import QUADRATIC
+from barberpole.effects.saturation import SATURATION
 from barberpole.effects.scale import SCALE
 from barberpole.effects.sensitivity_temperature import SENSITIVITY_TEMPERATURE
+from barberpole.effects.soft_iron import SOFT_IRON
 from barberpole.errors import InputError, must
 
 STACK: tuple[Effect, ...] = (
+    SOFT_IRON,
+    LOAD_CURRENT,
     MISALIGNMENT,
+    COIL_COUPLING,
+    MAINS,
+    LAG,
+    HYSTERESIS,
     CROSS_FIELD,
+    QUADRATIC,
+    CUBIC,
+    SATURATION,
     SENSITIVITY_TEMPERATURE,
     SCALE,
     FLIP_ASYMMETRY,
     BIAS,
     BIAS_TEMPERATURE,
+    DRIFT,
+    COIL_HEATING,
+    ADC_INL,
+    OUTLIERS,
 )
 ALIASES = {"hard_iron": "bias"}  # nothing in a log separates the two: the field of a magnet, seen through the gain
 

@@ -121,14 +121,14 @@ class Shape:
 
     columns     the parameters scored together, by name; all that are not `inner` if empty
     inner       values of the inner parameters meanwhile
-    secant      score the change up to `typical` instead of the derivative at the null
+    secant      score the change up to this many times `typical`, not the derivative at the null (0)
     settings    what the model file must say for a fit to begin in this form
     tried       how many alternatives a search looked through to propose it
     """
 
     columns: tuple[str, ...] = ()
     inner: dict[str, float] = field(default_factory=dict)
-    secant: bool = False
+    secant: float = 0.0
     settings: dict[str, Any] = field(default_factory=dict)
     tried: int = 1
 
@@ -146,8 +146,9 @@ class Effect:
     forward     (xyz, p, at) -> xyz: from the true field towards the reading
     undo        (xyz, p, at) -> xyz: the exact inverse for one magnetisation; where `compilable` in + - * / and
                 np.sqrt only, so that it runs on arrays and on the generator's symbols alike. p are plain numbers
-    jacobian    (xyz, p, at) -> `Slopes`. Without one the complex step is used
-    joint       (xyz, p, at) -> forward and both slopes at once, where they share their work
+    jacobian    (xyz, p, at) -> `Slopes`
+    joint       (xyz, p, at) -> forward and both slopes at once, where they share their work. With neither, the
+                complex step is used
     requires    log columns without which it cannot be judged
     flips       it tells SET from RESET, so a demodulated reading is the mean of two evaluations
     memory      a sample depends on earlier ones or their conditions: it needs whole time series
@@ -199,7 +200,9 @@ class Effect:
         return np.asarray(out), d_in, d_p
 
     def derivatives(self, xyz: Array, p: Numbers, at: Conditions) -> Slopes:
-        """`jacobian`, or the complex step where the effect gives none."""
+        """`jacobian`, or from `joint`, or the complex step where the effect gives neither."""
+        if self.joint and not self.jacobian:
+            return self.joint(xyz, p, at)[1:]
         return (self.jacobian or self.complex_step)(xyz, p, at)
 
     def complex_step(self, xyz: Array, p: Numbers, at: Conditions, h: float = 1e-30) -> tuple[Array, Array]:

@@ -51,11 +51,6 @@ def joint(xyz, p, at: Conditions):
     return out, unit[:, :, None], d_p
 
 
-def jacobian(xyz, p, at: Conditions):
-    """Slopes of (1)."""
-    return joint(xyz, p, at)[1:]
-
-
 MISALIGNMENT = Effect(
     "misalignment",
     "h_i = (B_i + sum e_ij B_j) / norm",
@@ -63,7 +58,6 @@ MISALIGNMENT = Effect(
     params,
     forward,
     undo,
-    jacobian,
     joint=joint,
     summary="the sensitive axes are not at right angles, or not along the axes of the reference",
 )
