@@ -20,10 +20,11 @@ class Fitted:
     p: np.ndarray
     easy_axis: tuple[int, int, int]
     t0_c: float
+    raw_polarity: bool
 
     def conditions(self, **known) -> Conditions:
-        """Conditions with this sensor's easy axes and reference temperature."""
-        return Conditions(easy_axis=self.easy_axis, t0_c=self.t0_c, **known)
+        """Conditions with this sensor's easy axes, reference temperature and polarity."""
+        return Conditions(easy_axis=self.easy_axis, t0_c=self.t0_c, raw_polarity=self.raw_polarity, **known)
 
     def undo_pair(self, set_xyz, reset_xyz, at: Conditions):
         """Field in µT from a SET and a RESET reading, both with the sign of SET."""
@@ -36,15 +37,15 @@ def from_calibration(calibration: Calibration) -> Fitted:
     Raises InputError if the parameters are not those of the effects it names.
     """
     extra = load_plugins(calibration.model.plugins)
-    model = _same_parameters(calibration, extra)
+    model, flipping = _same_parameters(calibration, extra)
     p = model.null.copy()
     for at, name in enumerate(model.names):
         if name in calibration.parameters:
             p[at] = calibration.parameters[name].value
-    return Fitted(model, p, calibration.easy_axis, calibration.t0_c)
+    return Fitted(model, p, calibration.easy_axis, calibration.t0_c, flipping == "raw")
 
 
-def _same_parameters(calibration: Calibration, extra: tuple[Effect, ...]) -> Model:
+def _same_parameters(calibration: Calibration, extra: tuple[Effect, ...]) -> tuple[Model, str]:
     """An effect's list of parameters depends on the reference and the flipping of the log: find the ones that fit."""
     names = {*calibration.parameters, *calibration.unobservable}
     settings = calibration.model.settings
@@ -55,5 +56,5 @@ def _same_parameters(calibration: Calibration, extra: tuple[Effect, ...]) -> Mod
         }
         model = compose(calibration.model.effects, setups, extra)
         if set(model.names) == names:
-            return model
+            return model, flipping
     raise InputError(must("the calibration", "one whose parameters belong to its effects", ", ".join(sorted(names))))

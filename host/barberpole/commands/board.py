@@ -1,2 +1,94 @@
-def register(app):
-    pass
+"""build, flash, record, pull, twin: what is done with a board."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from barberpole.calibration import read_calibration
+from barberpole.commands.console import AS_JSON, OUT, print_json, progress, table
+from barberpole.link.deploy import flash as flash_board
+from barberpole.link.deploy import pull as pull_run
+from barberpole.link.record import record as record_board
+from barberpole.link.record import soft_reset
+
+PortOption = Annotated[str, typer.Option("--port", help="Serial port, for example /dev/ttyACM0.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands to the roof."""
+    for command in (build, flash, record, pull, twin):
+        app.command()(command)
+
+
+def build(
+    board: Annotated[str, typer.Argument(help="Board name or .toml.")],
+    calibration: Annotated[Path | None, typer.Option(help="calibration.toml; without one, data-sheet values.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write.")] = Path("build"),
+    as_json: bool = AS_JSON,
+) -> None:
+    """Write the flash-resident modules, .mpy files, manifest, ROMFS image and budget."""
+    from barberpole_codegen.build import build as build_board
+
+    from barberpole.board import load_board
+    from barberpole.nominal import nominal
+
+    target = load_board(board)
+    used = read_calibration(calibration) if calibration else nominal(target)
+    made = build_board(target, used, output, None if as_json else lambda text: OUT.print(text, style="dim"))
+    if as_json:
+        print_json({"output": str(output), "calibration": made.calibration, "model": made.model, "budget": made.budget})
+    else:
+        OUT.print(_budget_table(made.budget))
+
+
+def _budget_table(budget: dict):
+    shown = table("budget", "what", "figure")
+    shown.add_row("flash", f"{budget['flash_bytes']['total']} bytes")
+    shown.add_row("ROMFS image", f"{budget['romfs_bytes']} bytes")
+    for what, figure in budget["time_us"].items():
+        if isinstance(figure, int | float):
+            shown.add_row(what, f"{figure:.0f} µs")
+    for what, fraction in budget["float32_error_of_full_scale"].items():
+        shown.add_row(f"float32 error, {what}", f"{fraction:.1e} of full scale")
+    return shown
+
+
+def flash(folder: Annotated[Path, typer.Argument(help="Folder made by build.")], port: PortOption) -> None:
+    """Put a build on a board through mpremote, verify it there, and restart the board."""
+    parcel = flash_board(folder, port, lambda text: OUT.print(text, style="dim"))
+    OUT.print(f"{port} runs calibration {parcel.calibration}")
+
+
+def record(
+    port: PortOption,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Board records (.bpr).")],
+    rows: Annotated[int | None, typer.Option(help="Stop after so many records.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so many seconds.")] = None,
+    restart: Annotated[bool, typer.Option(help="Begin with a soft reset, so that the power-up is in the log.")] = True,
+) -> None:
+    """Record what a board streams, until --rows, --seconds or Ctrl-C."""
+    with progress("recording", rows) as tick:
+        kept = record_board(port, output, rows, seconds, soft_reset if restart else lambda _: None, tick)
+    OUT.print(f"{kept} records written to {output}")
+
+
+def pull(
+    port: PortOption, output: Annotated[Path, typer.Option("-o", "--output", help="Board records (.bpr).")]
+) -> None:
+    """Fetch the coil run and the verdict of the last power-up from the board's flash."""
+    pull_run(port, output)
+    OUT.print(f"written to {output}")
+
+
+def twin(
+    board: Annotated[str, typer.Argument(help="Board name or .toml.")],
+    hidden: Annotated[list[str] | None, typer.Option(help="Effect in the board's truth; repeat for several.")] = None,
+    seed: Annotated[int, typer.Option(help="Noise and magnetisation.")] = 0,
+    flash_dir: Annotated[Path | None, typer.Option("--flash", help="Folder of the flash image, kept.")] = None,
+    fault: Annotated[list[str] | None, typer.Option(help="What is broken; repeat for several.")] = None,
+) -> None:
+    """Start the emulated board; its port is the first line. Ctrl-C switches it off."""
+    from barberpole.twin.command import run_twin
+
+    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()))

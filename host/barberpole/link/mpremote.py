@@ -32,7 +32,7 @@ def require_port(port: str) -> None:
 
 def copy(port: str, files: Sequence[tuple[Path, str]]) -> None:
     """Copy files to paths on the board in one session, making their folders; files already the same are skipped."""
-    folders = sorted({Path(target).parent.as_posix() for _, target in files} - {"/"})
+    folders = sorted({Path(target).parent.as_posix() for _, target in files} - {"/", "."})
     make = "import os\n" + "".join(f"try: os.mkdir({f!r})\nexcept OSError: pass\n" for f in folders)
     words = ["exec", make]
     for source, target in files:
