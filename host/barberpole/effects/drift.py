@@ -6,6 +6,8 @@ Ageing and stress move the offset slowly (article 3.2: seen, cause not found). S
 same: only warming and cooling again tells the two apart.
 """
 
+import numpy as np
+
 from barberpole.effects import polynomial
 from barberpole.effects.effect import Conditions, Effect, Setup
 
@@ -18,19 +20,24 @@ def params(setup: Setup):
     return polynomial.params(setup, "LSB", "s", typical, span=setup.duration_s)
 
 
+def _time(at: Conditions):
+    """Time since the reference in s."""
+    return np.asarray(at.t_s, float) - at.t0_s
+
+
 def forward(xyz, p, at: Conditions):
     """Eq. (1), LSB."""
-    return tuple(v + d for v, d in zip(xyz, polynomial.sums(p, at.t_s - at.t0_s), strict=True))
+    return tuple(v + d for v, d in zip(xyz, polynomial.sums(p, _time(at)), strict=True))
 
 
 def undo(xyz, p, at: Conditions):
     """Inverse of (1)."""
-    return tuple(v - d for v, d in zip(xyz, polynomial.sums(p, at.t_s - at.t0_s), strict=True))
+    return tuple(v - d for v, d in zip(xyz, polynomial.sums(p, _time(at)), strict=True))
 
 
 def jacobian(xyz, p, at: Conditions):
     """Slopes of (1)."""
-    return None, polynomial.powers(p, at.t_s - at.t0_s)
+    return None, polynomial.powers(p, _time(at))
 
 
 DRIFT = Effect(

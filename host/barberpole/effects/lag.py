@@ -8,6 +8,8 @@ y_k = y_(k-1) + dt / (tau + dt) (x_k - y_(k-1)), so that tau = 0 is exactly no l
 The first sample is taken as settled. Setting `axes = "common"`: one tau for all.
 """
 
+from typing import Any
+
 import numpy as np
 
 from barberpole.effects import series
@@ -16,7 +18,7 @@ from barberpole.effects.effect import Conditions, Effect, Param, Setup, Shape, p
 
 def params(setup: Setup):
     """tau in s, of each axis or one for all."""
-    limits = {"lower": 0.0, "upper": 0.25 * setup.duration_s, "typical": setup.interval_s}
+    limits: dict[str, Any] = {"lower": 0.0, "upper": 0.25 * setup.duration_s, "typical": setup.interval_s}
     if setup.named("axes", "each", "common") == "common":
         return (Param("tau", "s", **limits),)
     return per_axis("s", prefix="tau_", **limits)

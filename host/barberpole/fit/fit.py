@@ -115,8 +115,9 @@ def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float]) -> Fit:
 
 
 def with_reference(seen: Observations, file: ModelFile) -> Observations:
-    """Observations with the model file's reference temperature and easy axes."""
-    at = replace(seen.at, t0_c=float(file.reference.get("temp_c", seen.at.t0_c)))
+    """Observations with the model file's reference temperature; time counts from the start of the log."""
+    start = 0.0 if seen.at.t_s is None else float(seen.at.t_s[0])
+    at = replace(seen.at, t0_c=float(file.reference.get("temp_c", seen.at.t0_c)), t0_s=start)
     return replace(seen, at=at)
 
 
