@@ -222,7 +222,8 @@ def _undo(terms, xyz, p, at):
         if effect.undo is None:
             raise InputError(f"effect {effect.name} must have an undo to be compensated; it gives forward only")
         if effect.off_board and not isinstance(xyz[0], (np.ndarray, float, int)):
-            raise InputError(must(f"effect {effect.name}", "left out of a model for the board", effect.off_board))
+            got = f"{effect.name}, and {effect.off_board}"
+            raise InputError(must("a model for the board", "of effects that it can undo", got))
         xyz = effect.undo(xyz, p[term.at], at)
     return xyz
 
