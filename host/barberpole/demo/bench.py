@@ -16,7 +16,7 @@ from barberpole.link.record import record
 from barberpole.log import Log, read_log
 from barberpole.twin.ambient import Stations
 from barberpole.twin.api import Twin
-from barberpole.twin.temperature import Cycle
+from barberpole.twin.temperature import Plateaus
 from barberpole.twin.world import World
 
 TRUE_EFFECTS = ("misalignment", "cross_field", "sensitivity_temperature", "flip_asymmetry", "bias_temperature")
@@ -24,6 +24,7 @@ TRUE_EFFECTS = ("misalignment", "cross_field", "sensitivity_temperature", "flip_
 
 MAGNITUDES_UT = (30.0, 45.0, 60.0)
 HOLD_S = 0.04
+TEMPERATURES_C = (25.0, 33.0, 40.0, 30.0, 20.0, 15.0, 22.0, 30.0, 36.0, 25.0)
 POWER_UP_S = 3.0  # the field and the temperature rest until the self-calibration is over
 GUARD_S = 0.006  # a row this close to a step of the field has seen both sides of it
 
@@ -54,9 +55,9 @@ class Bench:
             yield twin
 
     def station(self, count: int, **drift) -> World:
-        """`count` known fields one after the other, while the temperature goes up and down."""
+        """`count` known fields one after the other, the oven up, down and up again."""
         fields = Stations.on_sphere(count, MAGNITUDES_UT, hold_s=HOLD_S, first_s=POWER_UP_S)
-        warm = Cycle(low_c=15.0, high_c=40.0, period_s=count * HOLD_S / 1.5, rest_s=POWER_UP_S)
+        warm = Plateaus(TEMPERATURES_C, count // len(TEMPERATURES_C) * HOLD_S, rest_s=POWER_UP_S)
         return World.of(self.board, TRUE_EFFECTS, ambient=fields, temperature=warm, **drift)
 
     def deploy(self, twin: Twin, calibration: Calibration, name: str) -> None:

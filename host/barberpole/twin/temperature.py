@@ -48,3 +48,22 @@ class Cycle:
 
     def constant_until(self, t_s: float) -> float:
         return self.rest_s if t_s < self.rest_s else t_s
+
+
+@dataclass(frozen=True)
+class Plateaus:
+    """Each level in turn for `hold_s`, after the first one for another `rest_s`; the last one stays."""
+
+    levels_c: tuple[float, ...] = (25.0, 40.0, 32.0, 25.0, 15.0, 20.0)
+    hold_s: float = 10.0
+    rest_s: float = 0.0
+
+    def temp_c(self, t_s: np.ndarray) -> np.ndarray:
+        place = np.floor(np.maximum(t_s - self.rest_s, 0.0) / self.hold_s).astype(int)
+        return np.asarray(self.levels_c, float)[np.minimum(place, len(self.levels_c) - 1)]
+
+    def constant_until(self, t_s: float) -> float:
+        if t_s < self.rest_s:
+            return self.rest_s + self.hold_s
+        place = math.floor((t_s - self.rest_s) / self.hold_s) + 1
+        return self.rest_s + place * self.hold_s if place < len(self.levels_c) else math.inf
