@@ -52,5 +52,15 @@ def switched(n: int, levels: int, rng: np.random.Generator) -> np.ndarray:
     return out
 
 
+def cycled(n: int, rng: np.random.Generator) -> np.ndarray:
+    """(n,) of 0 and 1 in turns of 300 to 900 samples."""
+    out, at, on = np.empty(n), 0, float(rng.integers(0, 2))
+    while at < n:
+        step = int(rng.integers(300, 900))
+        out[at : at + step] = on
+        at, on = at + step, 1.0 - on
+    return out
+
+
 def _unit(v: np.ndarray) -> np.ndarray:
     return v / np.linalg.norm(v)

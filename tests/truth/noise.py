@@ -4,7 +4,7 @@ import numpy as np
 
 
 def draw(n: int, sigma: float, corner: float, rng: np.random.Generator) -> np.ndarray:
-    """(3, n) of RMS sigma on average; one-sided density proportional to 1 + corner/f, f and corner in cycles a sample."""
+    """(3, n) of RMS sigma on average, density proportional to 1 + corner/f, both in cycles a sample."""
     if corner == 0.0:
         return sigma * rng.normal(size=(3, n))
     long = 4 * n  # a stretch out of a longer record: slower swings than the record itself are in it

@@ -42,7 +42,8 @@ def scene_of(recipe: Recipe, rows: int) -> Scene:
         if recipe.still_temperature
         else motion.temperature(rows, rng)
     )
-    coil = np.stack([20.0 * motion.switched(rows, 5, rng) - 10.0 for _ in range(3)])
+    worked = motion.cycled(rows, rng)  # the coils work and rest, so that their heat comes and goes
+    coil = worked * np.stack([20.0 * motion.switched(rows, 5, rng) - 10.0 for _ in range(3)])
     factors = rng.choice([-1.0, 1.0], (20, 3)) * rng.uniform(0.6, 1.4, (20, 3))
     factors[0] = 1.0 + 0.1 * rng.normal(size=3)  # anisotropy fields of one wafer are alike
     return Scene(

@@ -1,6 +1,6 @@
 """Hidden-effect trials: logs of the independent truth, each lacking one effect in the model, and what is said of them.
 
-    python -m truth.trials [--logs N] [--seed S]      prints confusion, rates by size, false alarms, foreign effects
+python -m truth.trials [--logs N] [--seed S]      prints confusion, rates by size, false alarms, foreign effects
 """
 
 import argparse

@@ -112,8 +112,8 @@ def _play(h, width):
 
 
 def coil_heating(h, c, scene, state):
-    """The coils' heat, filling and leaking in 15 s, changes the sensitivity."""
-    a = np.exp(-1.0 / (15.0 * scene.fs_hz))
+    """The coils' heat, filling and leaking in 5 s, shifts the offset."""
+    a = np.exp(-1.0 / (5.0 * scene.fs_hz))
     heat = lfilter([1 - a], [1, -a], np.sum(scene.i_ma**2, axis=0) / 100.0)
     return h + c * scene.factors[5][:, None] * heat
 

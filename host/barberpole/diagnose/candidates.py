@@ -55,8 +55,10 @@ def _forms(ground: Ground, absent: Absent, effect: Effect) -> list[tuple[Shape, 
     seen, fit = ground.fit.problem.seen, ground.fit
     base = setup_of(seen, fit.linear, absent.settings.get(effect.name))
     shapes = list(effect.forms(base))
-    if effect.search and ground.normal is None:
-        shapes += effect.search(base, seen.at, seen.y, ground.residual)
+    if effect.search:
+        # what is left of a scalar reference, laid back on the axes it came from
+        residual = ground.residual if ground.normal is None else ground.residual * ground.normal
+        shapes += effect.search(base, seen.at, seen.y, residual)
     setups = [(shape, replace(base, settings=base.settings | shape.settings)) for shape in shapes]
     if effect.flips and not absent.state_known and "form" not in base.settings:
         setups += [(s, replace(u, settings=u.settings | {"form": "unflipped"})) for s, u in setups]

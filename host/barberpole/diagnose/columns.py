@@ -88,8 +88,9 @@ def ground_of(fit: Fit, extra: Sequence[Effect] = ()) -> Ground:
     """
     seen = fit.problem.seen
     order = tuple(e.name for e in in_order(extra))
+    believed = 1.0 if fit.problem.believed is None else fit.problem.believed
     if seen.b_ut is not None:
-        return Ground(fit, seen.b_ut, fit.problem.residual(fit.p), _pathways(fit, seen.b_ut), None, order)
+        return Ground(fit, seen.b_ut, believed * fit.problem.residual(fit.p), _pathways(fit, seen.b_ut), None, order)
     raw = fit.field()
     norm, known = np.linalg.norm(raw, axis=0), fit.problem.magnitude(slice(None))
     field_ut = raw * (known / norm)
@@ -100,7 +101,7 @@ def ground_of(fit: Fit, extra: Sequence[Effect] = ()) -> Ground:
     transposed = np.swapaxes(full(np.asarray(slope), norm.size), 0, 1)
     normal = solve3(transposed, field_ut / known)  # gradient of |B| with respect to the reading
     steep = np.linalg.norm(normal, axis=0)
-    return Ground(fit, field_ut, ((norm - known) / steep)[None], paths, normal / steep, order)
+    return Ground(fit, field_ut, believed * ((norm - known) / steep)[None], paths, normal / steep, order)
 
 
 def _pathways(fit: Fit, field_ut: np.ndarray) -> list[Pathway]:
@@ -138,7 +139,9 @@ def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, 
     typical = np.array([q.typical or 1.0 for q in params])
     columns, even = _columns(ground, effect, null, typical, wanted, float(shape.secant))
     columns = ground.seen_through(columns)
-    start = {q.name: q.null + shape.secant * t if shape.secant else q.first for q, t in zip(params, typical, strict=True)}
+    start = {
+        q.name: q.null + shape.secant * t if shape.secant else q.first for q, t in zip(params, typical, strict=True)
+    }
     start |= shape.inner
     picked = tuple(name for name, w in zip(names, wanted, strict=True) if w)
     return Candidate(effect, setup, columns, picked, typical[wanted], not shape.secant, even, start, shape.tried)

@@ -9,9 +9,9 @@ import numpy as np
 
 from barberpole.diagnose.columns import Ground, ground_of
 from barberpole.diagnose.covariates import covariates
-from barberpole.diagnose.noise import Noise, estimate
-from barberpole.diagnose.patterns import Pattern, patterns, survey
-from barberpole.diagnose.turning import AnyNoise
+from barberpole.diagnose.noise import Noise
+from barberpole.diagnose.patterns import Pattern, background, patterns, survey
+from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
 
@@ -55,13 +55,12 @@ class Comparison:
         }
 
 
-def compare(fit: Fit, noise: AnyNoise | None = None, extra: Sequence[Effect] = ()) -> Comparison:
+def compare(fit: Fit, noise: Noise | None = None, extra: Sequence[Effect] = ()) -> Comparison:
     """What is left of the readings under a fit. `noise`: of the sensor at rest, else taken from the residual."""
     ground = ground_of(fit, extra)
     axes = axes_of(ground)
-    if noise is None:
-        white = Noise(np.full(len(axes), float(np.mean(ground.residual**2)) or 1.0))
-        noise = estimate(survey(ground, white).left_over(), "residual", slowest=8)
+    noise = background(ground) if noise is None else noise
+    white = whitening(noise, fit.problem.n, ground.normal)
     return Comparison(
         n=fit.problem.n,
         rms_lsb=fit.rms_lsb,
@@ -69,7 +68,7 @@ def compare(fit: Fit, noise: AnyNoise | None = None, extra: Sequence[Effect] = (
         rms_norm_percent=fit.rms_norm_percent(),
         rms_by_axis_lsb={a: float(np.sqrt(np.mean(r**2))) for a, r in zip(axes, ground.residual, strict=True)},
         noise_lsb=noise.rms(fit.problem.n),
-        patterns=tuple(patterns(survey(ground, noise))),
+        patterns=tuple(patterns(survey(ground, white))),
         curves=tuple(_curves(ground, noise)),
         spectrum=_spectrum(ground),
         sphere=_sphere(ground),
@@ -81,7 +80,7 @@ def axes_of(ground: Ground) -> tuple[str, ...]:
     return ("x", "y", "z") if ground.residual.shape[0] == 3 else ("norm",)
 
 
-def _curves(ground: Ground, noise: AnyNoise) -> list[Curve]:
+def _curves(ground: Ground, noise: Noise) -> list[Curve]:
     seen, out = ground.fit.problem.seen, []
     for covariate in covariates(seen, ground.field):
         if covariate.shapes[0] == "product" and len(covariate.basis) > 1:
@@ -102,7 +101,7 @@ def _in_its_unit(name: str, basis: np.ndarray, ground: Ground) -> np.ndarray:
     return basis if value is None else np.broadcast_to(np.asarray(value, float), basis.shape)
 
 
-def _curve(axis: str, against: str, values: np.ndarray, residual: np.ndarray, noise: AnyNoise) -> Curve:
+def _curve(axis: str, against: str, values: np.ndarray, residual: np.ndarray, noise: Noise) -> Curve:
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     count = np.maximum(np.bincount(bins), 1)
@@ -111,7 +110,7 @@ def _curve(axis: str, against: str, values: np.ndarray, residual: np.ndarray, no
     return Curve(axis, against, (np.bincount(bins, values) / count).tolist(), mean.tolist(), error.tolist())
 
 
-def _independent(noise: AnyNoise, span: int = 100) -> float:
+def _independent(noise: Noise, span: int = 100) -> float:
     """By how much correlated noise enlarges the error of a mean of `span` samples."""
     return float(np.sqrt(noise.shape(np.array([1.0 / span]))[0]))
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from barberpole.diagnose.candidates import Absent, absent_effects, candidates
-from barberpole.diagnose.columns import Ground, ground_of
+from barberpole.diagnose.columns import ground_of
 from barberpole.diagnose.experiments import next_experiment
-from barberpole.diagnose.noise import Noise, estimate
-from barberpole.diagnose.patterns import Pattern, Survey, patterns, survey
-from barberpole.diagnose.search import Evidence, Found, bic_gain, search
-from barberpole.diagnose.turning import AnyNoise, turning_noise
+from barberpole.diagnose.noise import estimate
+from barberpole.diagnose.patterns import Pattern, Survey, background, jump_patterns, patterns, survey
+from barberpole.diagnose.search import Evidence, Found, bic_gain, recheck, search
+from barberpole.diagnose.whitening import Whitening, whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
 from barberpole.fit.fit import Fit, fit_observations
@@ -24,8 +24,8 @@ from barberpole.sensor import Sensor
 GEOMETRY = 30.0  # condition number of the linear part above which nothing is named (full turns: below 6)
 BLIND = 0.05  # of an effect's RMS left by the baseline: below it this log cannot see the effect
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
-SLOWEST = 8  # periods a record: below this the residual has lost power to the fit
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
+MAIN_CAUSE = 0.3  # of what can be explained: a suspect that leaves structure must take this much to be named
 LINEAR = ("bias", "scale", "misalignment")
 
 
@@ -94,9 +94,10 @@ def diagnose_observations(
     lack = _geometry(fit)
     if lack:
         return _inconclusive(seen, lack, fit, absent)
-    noise = _noise(fit, absent, rest, extra)
-    found, evidence = search(fit, absent, noise, extra)
-    return _conclude(fit, absent, noise, found, evidence, extra)
+    white = _whitening(fit, absent, rest, extra)
+    found, evidence = search(fit, absent, white, extra)
+    found = recheck(fit, found, white, extra)
+    return _conclude(fit, absent, white, found, evidence, extra)
 
 
 def _about_its_temperature(seen: Observations) -> Observations:
@@ -121,63 +122,59 @@ def _geometry(fit: Fit) -> str:
     return ""
 
 
-def _noise(fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[Effect]) -> AnyNoise:
-    """From a record at rest, else from what no effect and no covariate explains."""
+def _whitening(fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[Effect]) -> Whitening:
+    """By the noise of a record at rest, else of what no effect and no covariate explains."""
     ground = ground_of(fit, extra)
     if rest is None:
-        left = _unexplained_residual(ground, [c.columns for c in candidates(ground, absent)])
-        noise = estimate(left, "residual", SLOWEST, ground.normal)
+        noise = background(ground, [c.columns for c in candidates(ground, absent)])
     else:
         noise = estimate(rest.y, "rest")
-    if ground.normal is None:
-        return noise
-    return turning_noise(noise, ground.normal) if noise.coloured else noise.common()
+    return whitening(noise, fit.problem.n, ground.normal)
 
 
-def _unexplained_residual(ground: Ground, known: list[np.ndarray]) -> np.ndarray:
-    """Residual (m, n) less everything that any effect or covariate can take."""
-    white = Noise(np.full(ground.residual.shape[0], float(np.mean(ground.residual**2)) or 1.0))
-    seen = survey(ground, white, known)
-    return seen.left_over()
-
-
-def _conclude(fit, absent, noise, found: list[Found], evidence: Evidence, extra) -> Diagnosis:
-    last = found[-1].fit if found else fit
-    left = survey(evidence.ground, noise)
-    covered, leftover = _coverage(found, left)
-    verdict = _verdict(found, covered, leftover)
-    first = left if not found else survey(ground_of(fit, extra), noise)
-    names = _visibility(evidence)
-    blind = tuple(n for n, v in names.items() if v < BLIND)
+def _conclude(fit, absent, white, found: list[Found], evidence: Evidence, extra) -> Diagnosis:
+    left = survey(evidence.ground, white)
+    remains = _remains(left)
+    covered = _covered(found, left)
+    verdict = _verdict(found, covered, bool(remains))
+    if verdict == "unexplained":
+        found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, left)]
+    shown = remains if verdict == "unexplained" or not found else patterns(survey(ground_of(fit, extra), white))
+    visible = _visibility(evidence)
+    blind = tuple(n for n, v in visible.items() if v < BLIND)
     groups = [(f.effect, *f.rivals) for f in found if f.rivals]
     return Diagnosis(
-        verdict,
-        fit.problem.n,
-        noise.rms(fit.problem.n),
-        fit.rms_lsb,
-        tuple(map(_suspect, found)),
-        tuple(patterns(left if verdict == "unexplained" else first)),
-        blind,
-        absent.unjudged,
-        next_experiment(verdict, groups, blind),
-        names,
-        (fit, *(f.fit for f in found)) if last is not fit else (fit,),
+        verdict=verdict,
+        n=fit.problem.n,
+        noise_lsb=white.noise.rms(fit.problem.n),
+        rms_lsb=fit.rms_lsb,
+        suspects=tuple(map(_suspect, found)),
+        patterns=tuple(shown),
+        cannot_be_seen=blind,
+        cannot_be_judged=absent.unjudged,
+        next_experiment=next_experiment(verdict, groups, blind, remains if found else []),
+        visibility=visible,
+        fits=(fit, *(f.fit for f in found)),
     )
 
 
-def _coverage(found: list[Found], left: Survey) -> tuple[float, bool]:
-    """Part of all that can be explained that the effects found explain; whether what is left is significant."""
+def _remains(left: Survey) -> list[Pattern]:
+    """What is significant in a residual: dependence on a covariate by its gain in BIC, and jumps."""
+    rss, count = left.projection.rss, left.table.count
+    gain = max((bic_gain(rss, *left.projection.score(columns), count) for _, _, columns in left.places), default=0.0)
+    found = jump_patterns(left)
+    return found + patterns(left) if gain > ENOUGH + 2 * np.log(len(left.places)) else found
+
+
+def _explainable(found: list[Found], left: Survey) -> float:
+    """Whitened sum of squares that effects found and covariates together take."""
     score, rank = left.projection.score(left.everything)
-    gain = max(
-        (
-            bic_gain(left.projection.rss, *left.projection.score(columns), left.table.count)
-            for _, _, columns in left.places
-        ),
-        default=0.0,
-    )
-    taken = sum(f.gain for f in found)
-    excess = max(score - rank, 0.0)
-    return taken / max(taken + excess, 1e-300), gain > ENOUGH + 2 * np.log(len(left.places))
+    return sum(f.fall for f in found) + max(score - rank, 0.0)
+
+
+def _covered(found: list[Found], left: Survey) -> float:
+    """Part of all that can be explained that the effects found explain."""
+    return sum(f.fall for f in found) / max(_explainable(found, left), 1e-300)
 
 
 def _verdict(found: list[Found], covered: float, leftover: bool) -> str:

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from barberpole.diagnose.patterns import Pattern
+
 # What makes an effect visible, where a log that lacks it cannot show it.
 MAKES_VISIBLE = {
     "flip_asymmetry": "record SET and RESET readings in turns, with a state column",
@@ -25,11 +27,16 @@ MAKES_VISIBLE = {
 REST = "record the sensor at rest for 60 s and pass it with --noise"
 
 
-def next_experiment(verdict: str, groups: Sequence[tuple[str, ...]], blind: Sequence[str]) -> str:
+def next_experiment(
+    verdict: str, groups: Sequence[tuple[str, ...]], blind: Sequence[str], remains: Sequence[Pattern]
+) -> str:
     """One sentence: settle a group that this log cannot tell apart, or make an invisible effect visible."""
     for group in groups:
         ways = dict.fromkeys(MAKES_VISIBLE[name] for name in group if name in MAKES_VISIBLE)
         return f"to tell {' from '.join(group)}: {'; '.join(ways)}"
+    if remains:
+        first = remains[0]
+        return f"the suspects leave structure: {first.axis} against {first.against}, {first.shape}"
     if verdict == "unexplained":
         return "no effect in the catalogue explains what is left: the patterns say against what it varies"
     for name in blind:

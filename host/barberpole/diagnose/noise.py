@@ -1,4 +1,4 @@
-"""The sensor's own noise: white plus a power law, and how to make residuals white with it.
+"""The sensor's own noise: white plus a power law.
 
     S_i(f) = w_i (1 + (f_c / f)^a)                                                   (1)
 
@@ -14,7 +14,8 @@ from numpy.fft import irfft, rfft
 EXPONENTS = np.linspace(0.6, 2.0, 8)
 CORNERS = np.geomspace(2e-4, 2.0, 25)  # cycles a sample
 BINS = 64  # of the periodogram, logarithmic: enough for three parameters
-COLOURED = 10.0  # gain in -2 log likelihood that a corner must bring, beside two log n
+COLOURED = 16.0  # gain in -2 log likelihood that a corner must bring
+LEAST_KEPT = 0.05  # of the power of a bin: less says nothing
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,6 @@ class Noise:
         """The same for one channel: the mean of the axes."""
         return replace(self, white=np.array([float(np.mean(self.white))]))
 
-    def whiten(self, channel: int, rows: np.ndarray) -> np.ndarray:
-        """Rows (K, n) of one channel, divided by the root of its spectrum: unit variance, no correlation."""
-        scale = 1.0 / np.sqrt(self.white[channel])
-        if not self.coloured:
-            return rows * scale
-        n = rows.shape[1]
-        return irfft(rfft(rows, axis=1) * (scale / np.sqrt(self.shape(frequencies(n)))), n, axis=1)
-
 
 def power_law(f: np.ndarray, corner: float, exponent: float) -> np.ndarray:
     """1 + (corner / f)^exponent."""
@@ -67,24 +60,28 @@ def frequencies(n: int) -> np.ndarray:
     return f
 
 
-def estimate(channels: np.ndarray, source: str, slowest: int = 1, normal: np.ndarray | None = None) -> Noise:
-    """Noise of residuals (m, n), without the frequencies below `slowest` periods a record.
+def estimate(
+    channels: np.ndarray, source: str, kept: np.ndarray | None = None, normal: np.ndarray | None = None
+) -> Noise:
+    """Noise of channels (m, n).
 
-    normal (3, n): of a scalar residual, along which the noise of the three axes was taken while the sensor turned.
+    kept (m, n // 2 + 1): part of the power that a fit has left at each frequency. normal (3, n): of a scalar residual,
+    along which the noise of the three axes was taken while the sensor turned.
     """
     n = channels.shape[1]
-    bins = _edges(n, slowest)
-    f = frequencies(n)
+    bins, f = _edges(n), frequencies(n)
     power = np.abs(rfft(channels - channels.mean(axis=1, keepdims=True), axis=1)) ** 2 / n
-    binned, weight = _binned(power, bins), np.diff(bins).astype(float)
+    kept = np.ones_like(power) if kept is None else kept
+    part = np.maximum(_binned(kept, bins), LEAST_KEPT)
+    binned, weight = _binned(power, bins) / part, np.diff(bins) * part
     turning = None if normal is None else _turning(normal)
-    trials = [(0.0, 1.0)] + [(c, a) for c in CORNERS[CORNERS > 1.0 / n] for a in EXPONENTS]
+    trials = [(0.0, 1.0)] + [(c, a) for c in CORNERS[1.0 / n < CORNERS] for a in EXPONENTS]
     shapes = [_binned(_seen_turning(power_law(f, c, a), turning, n)[None], bins)[0] for c, a in trials]
     deviance = [_deviance(binned, weight, shape) for shape in shapes]
     best = int(np.argmin(deviance))
-    if deviance[0] - deviance[best] < COLOURED + 2 * np.log(n):
+    if deviance[0] - deviance[best] < COLOURED:
         best = 0
-    level = np.average(binned / shapes[best], axis=1, weights=weight)
+    level = np.sum(binned / shapes[best] * weight, axis=1) / weight.sum(axis=1)
     return Noise(level, *(float(v) for v in trials[best]), source=source)
 
 
@@ -107,14 +104,15 @@ def _seen_turning(spectrum: np.ndarray, turning: np.ndarray | None, n: int) -> n
 
 
 def _deviance(power: np.ndarray, weight: np.ndarray, shape: np.ndarray) -> float:
-    """-2 log Whittle likelihood, white level of each channel at its best value."""
-    level = np.average(power / shape, axis=1, weights=weight)
-    return 2.0 * float(np.sum(weight) * np.sum(np.log(level)) + len(level) * np.sum(weight * np.log(shape)))
+    """-2 log Whittle likelihood of (m, k) bins, the white level of each channel at its best value."""
+    total = weight.sum(axis=1)
+    level = np.sum(power / shape * weight, axis=1) / total
+    return 2.0 * float(np.sum(total * np.log(level)) + np.sum(weight * np.log(shape)))
 
 
-def _edges(n: int, slowest: int) -> np.ndarray:
-    """Logarithmic bins of the ordinates of a periodogram."""
-    return np.unique(np.geomspace(slowest, (n + 1) // 2, BINS).astype(int))
+def _edges(n: int) -> np.ndarray:
+    """Logarithmic bins of the ordinates of a periodogram, without the mean."""
+    return np.unique(np.geomspace(1, (n + 1) // 2, BINS).astype(int))
 
 
 def _binned(power: np.ndarray, edges: np.ndarray) -> np.ndarray:

@@ -8,8 +8,10 @@ from scipy.stats import chi2
 
 from barberpole.diagnose.columns import Ground
 from barberpole.diagnose.covariates import Covariate, covariates, ripples
-from barberpole.diagnose.turning import AnyNoise
+from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.table import Design, Projection, Table, project, tabulate
+from barberpole.diagnose.tails import LIKELIER, jumps
+from barberpole.diagnose.whitening import Whitening
 
 SHOWN = 12  # patterns listed at most
 CHANCE = 1e-4  # p-value, corrected for the number of tests, below which a pattern is shown
@@ -28,13 +30,14 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Survey:
-    """A residual and every covariate in one table; places: (channel, covariate, columns)."""
+    """A residual (m, n) and every covariate in one table; places: (channel, covariate, columns)."""
 
+    residual: np.ndarray
     table: Table
     projection: Projection
     design: Design
     places: list[tuple[int, Covariate, np.ndarray]]
-    noise: AnyNoise
+    white: Whitening
 
     @property
     def everything(self) -> np.ndarray:
@@ -50,7 +53,7 @@ class Survey:
         return self.design.combine(weights)
 
 
-def survey(ground: Ground, noise: AnyNoise, known: Sequence[np.ndarray] = ()) -> Survey:
+def survey(ground: Ground, white: Whitening, known: Sequence[np.ndarray] = ()) -> Survey:
     """Residual of a fit against all covariates, with the baseline (and `known` columns) projected off."""
     seen = ground.fit.problem.seen
     channels = ground.residual.shape[0]
@@ -68,8 +71,15 @@ def survey(ground: Ground, noise: AnyNoise, known: Sequence[np.ndarray] = ()) ->
         if c.channel in (None, channel)
     ]
     design.add(ground.residual[:, None])
-    table = tabulate(design, noise)
-    return Survey(table, project(table, np.concatenate(baseline)), design, places, noise)
+    table = tabulate(design, white)
+    return Survey(ground.residual, table, project(table, np.concatenate(baseline)), design, places, white)
+
+
+def background(ground: Ground, known: Sequence[np.ndarray] = ()) -> Noise:
+    """The noise left in a residual by all that any covariate or known column can take."""
+    level = float(np.mean(ground.residual**2)) or 1.0
+    seen = survey(ground, Whitening(Noise(np.full(ground.residual.shape[0], level))), known)
+    return estimate(seen.left_over(), "residual", seen.design.kept(), ground.normal)
 
 
 def patterns(seen: Survey) -> list[Pattern]:
@@ -85,8 +95,21 @@ def patterns(seen: Survey) -> list[Pattern]:
 
 
 def _pattern(seen: Survey, channel, covariate, columns, score, chance) -> Pattern:
-    rows = float(seen.table.count) / len(seen.noise.white)
-    rms = float(np.sqrt(max(score, 0.0) / rows * seen.noise.white[channel]))
-    axis = "xyz"[channel] if len(seen.noise.white) == 3 else "norm"
+    rows = float(seen.table.count) / len(seen.white.noise.white)
+    rms = float(np.sqrt(max(score, 0.0) / rows * seen.white.noise.white[channel]))
     single = [seen.projection.score(columns[j : j + 1])[0] for j in range(len(columns))]
-    return Pattern(axis, covariate.name, covariate.shapes[int(np.argmax(single))], rms, chance)
+    return Pattern(_axis(seen, channel), covariate.name, covariate.shapes[int(np.argmax(single))], rms, chance)
+
+
+def jump_patterns(seen: Survey) -> list[Pattern]:
+    """Channels that rest on a level and jump to another: no covariate, but no noise either."""
+    found = []
+    for channel, gain in enumerate(jumps(seen.residual)):
+        if gain > LIKELIER:
+            rms = float(np.sqrt(np.mean(seen.residual[channel] ** 2)))
+            found.append(Pattern(_axis(seen, channel), "t_s", "jumps between levels", rms, max(np.exp(-gain), 1e-300)))
+    return found
+
+
+def _axis(seen: Survey, channel: int) -> str:
+    return "xyz"[channel] if len(seen.residual) == 3 else "norm"

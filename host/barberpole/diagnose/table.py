@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.diagnose.turning import AnyNoise
+from barberpole.diagnose.whitening import Whitening
 from barberpole.fit.gram import BLOCKS, FOLDS, block_edges
 
+ALIKE = 1e-8  # squared sine of the angle between columns below which they are one
 SEEN = 2.5e-3  # of a column's energy that must survive the baseline: 5 % of its RMS
 
 
@@ -46,6 +47,24 @@ class Design:
             ]
         )
 
+    def kept(self) -> np.ndarray:
+        """(m, n // 2 + 1): part of white noise that a fit by all columns but the last leaves at each frequency."""
+        return np.stack(
+            [
+                _kept(np.concatenate(rows)[np.concatenate(index) < self.count - 1])
+                for rows, index in zip(self.rows, self.index, strict=True)
+            ]
+        )
+
+
+def _kept(columns: np.ndarray) -> np.ndarray:
+    n = columns.shape[1]
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)[:, None]
+    values, vectors = np.linalg.eigh(columns @ columns.T)
+    used = values > ALIKE
+    basis = (vectors[:, used] / np.sqrt(values[used])).T @ columns
+    return 1.0 - np.sum(np.abs(np.fft.rfft(basis, axis=1)) ** 2, axis=0) / n
+
 
 @dataclass(frozen=True)
 class Table:
@@ -63,17 +82,17 @@ class Table:
         return float(self.m.sum())
 
 
-def tabulate(design: Design, noise: AnyNoise) -> Table:
+def tabulate(design: Design, white: Whitening) -> Table:
     """Whiten every column and accumulate. The residual must have been added last."""
     gram = np.zeros((BLOCKS, design.count, design.count))
     m = np.zeros(BLOCKS)
     for channel, (rows, index) in enumerate(zip(design.rows, design.index, strict=True)):
         if not rows:
             continue
-        white, numbers = noise.whiten(channel, np.concatenate(rows)), np.concatenate(index)
-        edges = block_edges(white.shape[1])
+        whitened, numbers = white.apply(channel, np.concatenate(rows)), np.concatenate(index)
+        edges = block_edges(whitened.shape[1])
         for block in range(BLOCKS):
-            part = white[:, edges[block] : edges[block + 1]]
+            part = whitened[:, edges[block] : edges[block + 1]]
             gram[block][np.ix_(numbers, numbers)] += part @ part.T
             m[block] += part.shape[1]
     return Table(gram, m)

@@ -10,13 +10,16 @@ from barberpole.errors import InputError
 from barberpole.fit import observability
 from barberpole.fit.gram import Gram, heldout_rms
 from barberpole.fit.residual import Problem
-from barberpole.fit.solve import minimise
+from barberpole.fit.solve import Solution, minimise
 from barberpole.fit.start import Linear, linear_part, start_values
 from barberpole.log import Log
 from barberpole.model import Model, compose
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations, observations
 
+OUTLIER = 4.0  # robust standard deviations; one normal reading in 16 000 lies beyond
+MAD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
+OUTLIER_PASSES = 4
 NOMINAL_MAGNITUDE_UT = 50.0  # where only its constancy is known; the scale is then relative to it
 
 
@@ -169,18 +172,38 @@ def missing_columns(seen: Observations, effect: Effect) -> tuple[str, ...]:
 def fit_problem(
     problem: Problem, linear: Linear, known: dict[str, Setup], extra: tuple[Effect, ...], p: np.ndarray, tick=None
 ) -> Fit:
-    """Minimise from p, freezing what the log cannot determine: first what is dependent, then what is undetermined."""
-    null, free = problem.model.null, np.ones(len(p), bool)
+    """Minimise from p, freezing what the log cannot determine, and leaving outliers out where the model says so."""
     if problem.n * problem.residuals_per_sample <= len(p):
         raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
+    if problem.model.loss is None:
+        problem = replace(problem, believed=None)
+    solution = _determined(problem, p, np.ones(len(p), bool), tick)
+    for _ in range(OUTLIER_PASSES if problem.model.loss else 0):
+        believed = believable(problem.residual(solution.p))
+        if problem.believed is not None and np.array_equal(believed, problem.believed):
+            break
+        problem = replace(problem, believed=believed)
+        solution = _determined(problem, solution.p, solution.free, tick)
+    cov = observability.covariance(solution.gram, solution.free)
+    return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra)
+
+
+def believable(residual: np.ndarray) -> np.ndarray:
+    """Mask (m, n) of residuals within OUTLIER robust standard deviations of their channel's median."""
+    apart = np.abs(residual - np.median(residual, axis=1, keepdims=True))
+    return apart <= OUTLIER * MAD * np.median(apart, axis=1, keepdims=True)
+
+
+def _determined(problem: Problem, p: np.ndarray, free: np.ndarray, tick=None) -> Solution:
+    """Freeze first what is dependent, then what is undetermined, at its null."""
+    null = problem.model.null
     while True:
         solution = minimise(problem, p, free, tick)
         keep = observability.independent(solution.gram, free)
         if np.array_equal(keep, free):
             worst = observability.undetermined(problem.model, solution.gram, free)
             if worst is None:
-                cov = observability.covariance(solution.gram, free)
-                return Fit(problem, solution.p, cov, solution.gram, free, solution.converged, linear, known, extra)
+                return solution
             keep = free.copy()
             keep[worst] = False
         p = np.where(free & ~keep, null, solution.p)

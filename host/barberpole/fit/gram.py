@@ -50,6 +50,7 @@ def accumulate(problem, p: np.ndarray, sigma: float = 0.0, tick: Callable[[int],
             first, last = max(edges[block], rows.start) - rows.start, min(edges[block + 1], rows.stop) - rows.start
             if first < last:
                 _add(gram, block, r[:, first:last], j[:, :, first:last])
+                gram.m[block] += problem.counted(slice(rows.start + first, rows.start + last))
         if tick:
             tick(rows.stop - rows.start)
     return gram
@@ -60,7 +61,6 @@ def _add(gram: Gram, block: int, r: np.ndarray, j: np.ndarray) -> None:
         gram.jj[block] += columns @ columns.T
         gram.jr[block] += columns @ residual
         gram.rr[block] += residual @ residual
-        gram.m[block] += residual.size
 
 
 def heldout_rms(gram: Gram) -> float:

@@ -20,11 +20,15 @@ DIFFERENCE = 1e-6  # of a parameter's size: step of a numerical derivative
 
 @dataclass(frozen=True)
 class Problem:
-    """A model held against observations. `magnitude_ut` is K where the log does not carry one (reference constant)."""
+    """A model held against observations. `magnitude_ut` is K where the log does not carry one (reference constant).
+
+    believed (m, n): False where a residual is taken for an outlier and does not count.
+    """
 
     model: Model
     seen: Observations
     magnitude_ut: float = 50.0
+    believed: np.ndarray | None = None
 
     @property
     def vector(self) -> bool:
@@ -54,6 +58,13 @@ class Problem:
 
         sigma (LSB): noise of a reading, which lengthens the fitted field of a scalar reference a little.
         """
+        residual, d_p = self._linearise(p, rows, sigma)
+        if self.believed is None:
+            return residual, d_p
+        believed = self.believed[:, rows]
+        return residual * believed, d_p * believed[:, None]
+
+    def _linearise(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
         seen, at = self.seen, self.seen.at.take(rows)
         if seen.b_ut is not None:
             y, d_p, _ = self.model.linearise(seen.b_ut[:, rows], p, at)
@@ -88,12 +99,18 @@ class Problem:
             derivative[j] = (base - self._distance(p + step, rows, sigma)[0]) / step[j]
         return base[None], derivative[None]
 
+    def counted(self, rows: slice) -> int:
+        """How many residuals of `rows` count."""
+        if self.believed is None:
+            return (rows.stop - rows.start) * self.residuals_per_sample
+        return int(np.count_nonzero(self.believed[:, rows]))
+
     def magnitude(self, rows: slice) -> np.ndarray | float:
         """K of each sample in µT."""
         return self.magnitude_ut if self.seen.b_mag is None else self.seen.b_mag[rows]
 
     def residual(self, p: np.ndarray) -> np.ndarray:
-        """All residuals (m, n) in LSB."""
+        """All residuals (m, n) in LSB, outliers too."""
         seen = self.seen
         if seen.b_ut is None:
             return np.concatenate([self._distance(p, rows, 0.0)[0] for rows in self.chunks()])[None]

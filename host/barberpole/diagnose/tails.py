@@ -1,0 +1,49 @@
+"""Residuals that no smooth cause makes: single wrong readings, and jumps from one level to another."""
+
+import numpy as np
+
+LIKELIER = 15.0  # gain in log likelihood that a second, wider population must bring
+CLUMPED = 4.0  # in standard errors: squared residuals this alike from sample to sample are no single outliers
+EM_STEPS = 30
+STEP = 9  # samples on either side of a possible jump; medians of nine pass over single outliers
+MAD = 1.4826  # of a normal distribution: standard deviation over median absolute deviation
+
+
+def wrong_readings(z: np.ndarray) -> float:
+    """Evidence (log likelihood) for single outliers in white residuals (m, n); 0 if they come in clumps."""
+    square = z * z - np.mean(z * z, axis=1, keepdims=True)
+    limit = np.quantile(square, 0.999)  # a few giants would make any correlation
+    square = np.minimum(square, limit)
+    square -= square.mean(axis=1, keepdims=True)
+    alike = np.sum(square[:, 1:] * square[:, :-1]) / np.sum(square * square) * np.sqrt(square.size)
+    return 0.0 if alike > CLUMPED else two_populations(z.ravel())
+
+
+def jumps(residual: np.ndarray) -> np.ndarray:
+    """Evidence (m,) for jumps between levels in residuals (m, n), whatever their colour.
+
+    Gaussian noise of any spectrum has Gaussian differences of medians; a signal that rests and jumps has not.
+    """
+    n = residual.shape[1] // STEP
+    if n < 4 * STEP:
+        return np.zeros(residual.shape[0])
+    level = np.median(residual[:, : n * STEP].reshape(residual.shape[0], n, STEP), axis=2)
+    return np.array([two_populations(row) for row in np.diff(level, axis=1)])
+
+
+def two_populations(x: np.ndarray) -> float:
+    """Gain in log likelihood of a few values of wider spread among normal ones, over all being alike."""
+    x = x - np.median(x)
+    plain = -0.5 * x.size * np.log(np.mean(x * x) + 1e-300) - 0.5 * x.size
+    narrow, wide, part = (MAD * float(np.median(np.abs(x)))) ** 2 + 1e-300, float(np.max(x * x)) + 1e-300, 0.02
+    likely = plain
+    for _ in range(EM_STEPS):
+        low = (1 - part) / np.sqrt(narrow) * np.exp(-0.5 * x * x / narrow)
+        high = part / np.sqrt(wide) * np.exp(-0.5 * x * x / wide)
+        total = low + high + 1e-300
+        likely = float(np.sum(np.log(total)))
+        share = high / total
+        part = float(np.clip(np.mean(share), 1e-6, 0.5))
+        wide = float(np.sum(share * x * x) / max(np.sum(share), 1e-300)) + 1e-300
+        narrow = float(np.sum((1 - share) * x * x) / np.sum(1 - share)) + 1e-300
+    return max(likely - plain, 0.0)
