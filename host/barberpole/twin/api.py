@@ -6,6 +6,7 @@
 ...     twin.power_cycle(faults=("coil_open_x",))
 """
 
+import math
 import os
 import socket
 import subprocess
@@ -96,7 +97,7 @@ class Twin:
         world: World | None = None,
         seed: int | None = None,
         faults: Iterable[str] | None = None,
-        cut_s: float = float("inf"),
+        cut_s: float = math.inf,
     ) -> None:
         """Off and on again: same flash, fresh chips, new magnetisation; what is given replaces what it was.
 

@@ -4,6 +4,7 @@
 physics take turns, so both are kept on one processor: a turn costs a tenth there of what it costs across two.
 """
 
+import math
 import os
 import select
 import signal
@@ -12,8 +13,9 @@ import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
+from barberpole.twin.ads131m08 import NEVER_US
 from barberpole.twin.port import Port
-from barberpole.twin.running import HARD, POWER_ON, SOFT, Ending, Job, Running
+from barberpole.twin.running import HARD, POWER_ON, SOFT, Ending, Job, Running, Start
 from barberpole.twin.soldered import Soldered
 from barberpole.twin.world import World
 
@@ -29,7 +31,7 @@ class Power:
     world: World
     seed: int
     faults: frozenset[str]
-    cut_s: float = float("inf")
+    cut_s: float = math.inf
     """s. Board time at which the power goes away again."""
 
 
@@ -115,7 +117,7 @@ class BoardProcess:
         self._crashes = 0
         self._cut = False
         self._soldered = Soldered(self._job.board, power.world, power.seed, self._power_ups, power.faults)
-        self._start(POWER_ON, raw=False, now_us=0)
+        self._start(POWER_ON)
 
     def _power_off(self) -> None:
         """The interpreter stops where it is."""
@@ -123,12 +125,14 @@ class BoardProcess:
             self._running.kill()
             self._end()
 
-    def _start(self, cause: int, raw: bool, now_us: int) -> None:
-        if self._soldered:
-            self._start_us = now_us
-            self._soldered.release_pins(now_us)
-            self._running = Running(self._job, self._soldered, cause, raw, now_us, self._say)
-            self._watch(self._running.wire_fd, True)
+    def _start(self, cause: int, now_us: int = 0, raw: bool = False) -> None:
+        if self._power is None or self._soldered is None:
+            return
+        cut_us = NEVER_US if math.isinf(self._power.cut_s) else math.ceil(1e6 * self._power.cut_s)
+        self._start_us = now_us
+        self._soldered.release_pins(now_us)
+        self._running = Running(self._job, self._soldered, Start(cause, raw, now_us, cut_us), self._say)
+        self._watch(self._running.wire_fd, True)
 
     def _end(self) -> Ending:
         running, self._running = self._running, None
@@ -145,14 +149,14 @@ class BoardProcess:
         if self._cut:
             return
         if ending.hard:
-            self._start(HARD, raw=False, now_us=ending.now_us)
+            self._start(HARD, ending.now_us)
         elif not os.WIFSIGNALED(ending.status):
             self._say(b"MPY: sync filesystems\r\nMPY: soft reboot\r\n")
-            self._start(SOFT, raw=ending.raw, now_us=ending.now_us)
+            self._start(SOFT, ending.now_us, ending.raw)
         elif self._crashes < MAX_CRASHES:
             self._crashes += 1
             self._say(b"the interpreter crashed (signal %d)\r\n" % os.WTERMSIG(ending.status))
-            self._start(HARD, raw=False, now_us=ending.now_us)
+            self._start(HARD, ending.now_us)
 
     def _allow(self, now_us: int) -> bool:
         """Whether there is power at this board time; where it ends, the interpreter does."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from barberpole.board import Board
+from barberpole.twin.ads131m08 import NEVER_US
 from barberpole.twin.console import Console
 from barberpole.twin.interpreter import Interpreter
 from barberpole.twin.pins import PINS, SPI_CLOCK_HZ
@@ -15,6 +16,7 @@ from barberpole.twin.soldered import Soldered
 from barberpole.twin.wire import Op, Wire
 
 INTERRUPT_S = 0.1  # a program that asks nothing for so long is interrupted by a signal
+INSIST_S = 2.0  # and one that asks only what must not be interrupted, after this
 PORT_RAM_KIB = 92  # of the STM32F405's RAM, what MicroPython itself takes; the rest is heap
 POWER_ON, HARD, SOFT = 1, 2, 0  # machine.reset_cause()
 CTRL_A, CTRL_C = b"\x01", b"\x03"
@@ -30,6 +32,20 @@ class Job:
 
 
 @dataclass(frozen=True)
+class Start:
+    """What one start begins with."""
+
+    cause: int
+    """Of machine.reset_cause()."""
+    raw: bool = False
+    """Whether the prompt before was the raw one."""
+    now_us: int = 0
+    """µs. Board time."""
+    cut_us: int = NEVER_US
+    """µs. Board time at which the power goes."""
+
+
+@dataclass(frozen=True)
 class Ending:
     """How a start ended: wait status, prompt it was in, board time, and whether machine.reset() asked for it."""
 
@@ -40,14 +56,13 @@ class Ending:
 
 
 class Running:
-    """A running interpreter. `say` gets its output; `allow(t_us)` False means that the power is gone at that time."""
+    """A running interpreter; `say` gets its output."""
 
-    def __init__(self, job: Job, soldered: Soldered, cause: int, raw: bool, now_us: int, say: Callable[[bytes], None]):
+    def __init__(self, job: Job, soldered: Soldered, start: Start, say: Callable[[bytes], None]):
         self._say = say
-        self._console = Console(raw)
-        self._wire = Wire(soldered, self._on_op, now_us)
-        setup = self._setup(job, raw, cause, now_us)
-        self._interpreter = Interpreter(job.micropython, heap_bytes(job.board), setup)
+        self._console = Console(start.raw)
+        self._wire = Wire(soldered, self._on_op, start.now_us)
+        self._interpreter = Interpreter(job.micropython, heap_bytes(job.board), self._setup(job, start))
         self._wire.close_far_ends()
         self._started = self._ready = self._hard = False
         self._pending = b""  # input that waits for the prompt
@@ -73,14 +88,15 @@ class Running:
         """Readable when the interpreter has said something, or has ended."""
         return self._interpreter.fileno
 
-    def _setup(self, job: Job, raw: bool, cause: int, now_us: int) -> dict:
+    def _setup(self, job: Job, start: Start) -> dict:
         board, (to, source) = job.board, self._wire.far_ends
         return {
             "to": to,
             "from": source,
-            "now": now_us,
-            "raw": raw,
-            "cause": cause,
+            "now": start.now_us,
+            "cut": start.cut_us,
+            "raw": start.raw,
+            "cause": start.cause,
             "image": str(job.image),
             "pins": PINS,
             "drdy": board.adc.drdy_pin,
@@ -91,7 +107,7 @@ class Running:
         }
 
     def serve_wire(self, allow: Callable[[int], bool]) -> bool:
-        """Answer a request; False when there will be no more of them."""
+        """Answer a request; False when there will be no more. `allow(t_us)` False: there is no power at that time."""
         alive = self._wire.serve(allow)
         if not self._wire.interrupt:
             self._interrupt_at = None  # an answer has brought it
@@ -149,7 +165,7 @@ class Running:
         if self._interrupt_at is None or now_s < self._interrupt_at:
             return
         with self._interpreter.stopped():
-            if self._wire.asks():
+            if self._wire.asks() and now_s < self._interrupt_at + INSIST_S:
                 return
             self._interrupt_at, self._wire.interrupt = None, False
             if self._interpreter.executes():

@@ -50,11 +50,13 @@ def exchange(op, bus=0, out=None, into=None):
         _from.readinto(into)
     now = _answer[0]
     _ready = _answer[1]
-    if now < 0:
+    interrupted = now < 0
+    if interrupted:
         now = ~now
-        _sync_at = now + _SYNC_EVERY
+    if op != FLASH:  # whose answers bring no interrupt
+        _sync_at = min(now + _SYNC_EVERY, setup["cut"])
+    if interrupted:
         raise KeyboardInterrupt
-    _sync_at = now + _SYNC_EVERY
 
 
 def advance(us):
