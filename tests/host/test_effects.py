@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from barberpole.chain import full
 from barberpole.effects import ALIASES, STACK, Conditions, Effect, Setup, find_effect, in_order
+from barberpole.effects.arithmetic import Bare
 from barberpole.effects.effect import spread
 from barberpole.errors import InputError
 
@@ -155,39 +156,6 @@ def test_shapes_name_their_own_parameters(effect: Effect, setup: Setup):
         assert set(shape.inner) <= {n for n, p in names.items() if p.inner}
         for name, value in shape.inner.items():
             assert names[name].lower <= value <= names[name].upper
-
-
-@dataclasses.dataclass(frozen=True)
-class Bare:
-    """A number that knows + - * / and sqrt and nothing else: no comparison, no branch, no conversion."""
-
-    value: float
-
-    def sqrt(self):
-        return Bare(self.value**0.5)
-
-    def __neg__(self):
-        return Bare(-self.value)
-
-    def __add__(self, other):
-        return Bare(self.value + getattr(other, "value", other))
-
-    def __mul__(self, other):
-        return Bare(self.value * getattr(other, "value", other))
-
-    def __sub__(self, other):
-        return self + -other
-
-    def __rsub__(self, other):
-        return -self + other
-
-    def __truediv__(self, other):
-        return Bare(self.value / getattr(other, "value", other))
-
-    def __rtruediv__(self, other):
-        return Bare(other / self.value)
-
-    __radd__, __rmul__ = __add__, __mul__
 
 
 @pytest.mark.parametrize(("effect", "setup"), [e for e in EVERY if e.values[0].compilable])
