@@ -1,7 +1,7 @@
 # bp_compensate.py: from the sums of a point to physical figures: field, temperature, currents, supply.
 # The field is the factory calibration, undone by the generated bp_calibration, composed with today's coil result
-# (thesis 6.7): `gain` enters where the scale does, after the bias is taken off, and `shift_ut` is the change of the
-# bias that only a shielded run can know; it is zero otherwise.
+# (thesis 6.7): `gain` enters where the scale does, after the bias is taken off; `offset_lsb` is the bridges' electronic
+# offset beyond the model's; `shift_ut` is the change of the bias that only a shielded run can know, zero otherwise.
 import bp_sampler as at
 
 
@@ -10,10 +10,18 @@ class Compensator:
         self._board = board
         self._undo = calibration.undo
         self.gain = (1.0, 1.0, 1.0)
+        self.offset_lsb = calibration.FACTORY_OFFSET_LSB
         self.shift_ut = (0.0, 0.0, 0.0)
 
+    def put_in_force(self, stored):  # a bp_store.Stored
+        self.gain = tuple(stored.gain)
+        self.offset_lsb = tuple(stored.offset_lsb)
+        self.shift_ut = tuple(stored.shift_ut)
+
     def field_ut(self, means, temp_c):  # means: six averages in LSB as `means_lsb` gives them
-        x, y, z = self._undo(means[0], means[1], means[2], -means[3], -means[4], -means[5], temp_c, *self.gain)
+        after_set = [means[i] - self.offset_lsb[i] for i in range(3)]
+        after_reset = [self.offset_lsb[i] - means[3 + i] for i in range(3)]
+        x, y, z = self._undo(*after_set, *after_reset, temp_c, *self.gain)
         shift = self.shift_ut
         return x - shift[0], y - shift[1], z - shift[2]
 

@@ -76,7 +76,7 @@ def run():
 def power_up(hardware, writer, clock):  # False where no samples can be had
     head = report.header(binascii.hexlify(machine.unique_id()).decode(), bp_store.next_boot(FOLDER))
     writer.json(records.HEADER, head)
-    store = bp_store.Store(FOLDER, calibration.CALIBRATION)
+    store = bp_store.Store(FOLDER, calibration.CALIBRATION, calibration.FACTORY_OFFSET_LSB)
     held = store.load()
     notes = _notes(store)
     codes, can_sample, detail = self_test(hardware)
@@ -85,10 +85,9 @@ def power_up(hardware, writer, clock):  # False where no samples can be had
     if not codes:
         result = _self_calibrate(hardware, writer, clock)
         codes, detail = result.reasons, result.detail
-        if result.solution is not None and not codes and calibration.HAS_FACTORY_REFERENCE:
-            held = store.save(result.solution.gain, _shift_ut(result.solution), result.offset_lsb, result.temp_c())
-    hardware.compensator.gain = tuple(held.gain)
-    hardware.compensator.shift_ut = tuple(held.shift_ut)
+        if result.solution is not None and not codes:
+            held = _save(store, result.solution, result.temp_c())
+    hardware.compensator.put_in_force(held)
     if not calibration.HAS_FACTORY_REFERENCE:
         codes = codes + [reasons.NO_FACTORY_REFERENCE]
     verdict = report.verdict(codes, held, result)
@@ -145,6 +144,12 @@ def _self_calibrate(hardware, writer, clock):
         raise
 
 
+def _save(store, solution, temp_c):  # gains of 1 where there is nothing to compare today's with
+    gain = solution.gain if calibration.HAS_FACTORY_REFERENCE else (1.0, 1.0, 1.0)
+    shift_ut = calibration.in_frame(*solution.ambient_ut) if board.SHIELDED else (0.0, 0.0, 0.0)
+    return store.save(gain, shift_ut, solution.offset_lsb, temp_c)
+
+
 def _notes(store):  # codes of what is worth knowing and forbids nothing
     found = []
     if store.corrupt:
@@ -152,7 +157,3 @@ def _notes(store):  # codes of what is worth knowing and forbids nothing
     if any(name.startswith("bp_") for name in os.listdir()):
         found.append(reasons.SHADOWED)
     return found
-
-
-def _shift_ut(solution):  # only a shielded run knows it
-    return calibration.in_frame(*solution.ambient_ut) if board.SHIELDED else (0.0, 0.0, 0.0)

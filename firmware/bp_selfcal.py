@@ -9,8 +9,8 @@
 #   ambient   c_i holds the ambient field and any change of the bias since the factory (magnetic or left over from
 #             demodulation). Unshielded, nothing in the run separates the two: the factory bias stays in force and c is
 #             reported only. Shielded, the ambient is zero and c is the change of bias (the B_c of eq. 6.7).
-#   offset    half of SET + RESET is the bridge's and amplifier's own offset (thesis 3.4), shielded or not, up to the
-#             SET/RESET asymmetry times the ambient field. Demodulation has removed it already; it is a sign of health.
+#   offset    the bridge's and amplifier's own offset (thesis 3.4), shielded or not: with the right one SET and RESET
+#             give the same field. Demodulation removes it to first order; the cross field sees it once more.
 #   axes      nothing is learnt of the angles between the axes: each coil sits on its own die and turns with it.
 # Points come as pairs +u, -u and in blocks in which every axis sees the same mean square. The mean of h over a block
 # is therefore c, whatever the gains and whatever even term the model lacks, and a step of c between blocks is a step of
@@ -19,19 +19,24 @@ import math
 import struct
 import time
 
+from micropython import const
+
 import bp_compensate
 import bp_reasons as reasons
 from bp_givens import Givens
 from bp_points import Points
 
+_LOOKS = const(3)  # at the first block, before the whole run
+
 
 class Solution:
-    def __init__(self, gain, response, ambient_ut, residual_ut, step_ut):
+    def __init__(self, gain, response, ambient_ut, residual_ut, step_ut, offset_lsb):
         self.gain = gain  # over the factory gain, three
         self.response_ut = response  # (1), uT per unit as the factory calibration reads it: three rows of three
         self.ambient_ut = ambient_ut  # c of (1)
         self.residual_ut = residual_ut  # rms by axis
         self.step_ut = step_ut  # largest change of c between blocks
+        self.offset_lsb = offset_lsb  # electronic offset beyond the model's
 
 
 def measure(points, sampler, coils, compensator, trajectory, board):  # fills points; coils at zero on every way out
@@ -57,44 +62,57 @@ def _average(sampler, board):
 
 
 def solve(points, calibration, trajectory, gain_limit):
-    # The law of the bridge is curved, so where it is evaluated matters a little: a first look at one block gives gains
-    # good to 1e-3, and the whole run is then read with these.
+    # The law of the bridge is curved, so the gain and the offset at which it is read matter a little: looks at the
+    # first block settle both, each at least twenty times better than the last, and then the whole run is read.
     block = trajectory.BLOCK or points.count
-    look = _Fit(points, 0, block, (1.0, 1.0, 1.0), calibration)
-    first = look.gain()
-    if max(abs(g - 1.0) for g in first) > gain_limit:
-        first = [1.0, 1.0, 1.0]
-    fit = _Fit(points, 0, points.count, first, calibration, trajectory.BLOCK)
-    response = [[first[i] * g for g in row] for i, row in enumerate(fit.response)]
-    gain = [first[i] * g for i, g in enumerate(fit.gain())]
-    return Solution(gain, response, fit.ambient_ut, fit.residual_ut, fit.step_ut())
+    gain, offset = [1.0, 1.0, 1.0], list(calibration.FACTORY_OFFSET_LSB)
+    for _ in range(_LOOKS):
+        look = _Fit(points, block, gain, offset, calibration)
+        gain, offset = look.better_gain(gain), look.better_offset(gain, offset)
+        if max([abs(g - 1.0) for g in gain]) > gain_limit:
+            gain = [1.0, 1.0, 1.0]
+    fit = _Fit(points, points.count, gain, offset, calibration, trajectory.BLOCK)
+    response = [[gain[i] * g for g in fit.response[i]] for i in range(3)]
+    return Solution(
+        fit.better_gain(gain),
+        response,
+        fit.ambient_ut,
+        fit.residual_ut,
+        fit.step_ut(),
+        fit.better_offset(gain, offset),
+    )
 
 
-class _Fit:  # equation (1) over points first..last, read with `gain`
-    def __init__(self, points, first, last, gain, calibration, block=0):
-        self._factory = calibration.FACTORY_GAIN_UT_PER_UNIT
+class _Fit:  # equation (1) over the first points, read at this gain and offset
+    def __init__(self, points, count, gain, offset, calibration, block=0):
+        self._calibration = calibration
         self._block_means = []
+        self._apart_ut = [0.0, 0.0, 0.0]  # half of what SET and RESET differ by
         givens = Givens(4, 3)
-        for index in range(first, last):
-            field = self._add(givens, points.get(index), gain, calibration.undo_coil)
+        for index in range(count):
+            point = points.get(index)
+            field = self._field(point, gain, offset, count)
+            for i in range(3):
+                givens.row[1 + i] = point[1 + i]
+                givens.row[4 + i] = field[i]
+            givens.row[0] = 1.0
+            givens.add()
             if block:
-                self._note_block(index - first, field, block)
+                self._note_block(index, field, block)
         solved = [givens.solve(k) for k in range(3)]
         self.ambient_ut = [x[0] for x in solved]
         self.response = [x[1:] for x in solved]
         self.residual_ut = [math.sqrt(rss / max(givens.n - 4, 1)) for rss in givens.rss]
 
-    def _add(self, givens, point, gain, undo_coil):
-        u = point[1:4]
-        coil = [self._factory[i][i] * u[i] for i in range(3)]
-        field = undo_coil(*point[4:7], *[-v for v in point[7:10]], point[13], *gain, *coil)
-        row = givens.row
-        row[0] = 1.0
+    def _field(self, point, gain, offset, count):
+        factory = self._calibration.FACTORY_GAIN_UT_PER_UNIT
+        after_set = [point[4 + i] - offset[i] for i in range(3)]
+        after_reset = [offset[i] - point[7 + i] for i in range(3)]
+        coil = [factory[i][i] * point[1 + i] for i in range(3)]
+        fields = self._calibration.undo_coil(*after_set, *after_reset, point[13], *gain, *coil)
         for i in range(3):
-            row[1 + i] = u[i]
-            row[4 + i] = field[i]
-        givens.add()
-        return field
+            self._apart_ut[i] += 0.5 * (fields[i] - fields[3 + i]) / count
+        return [0.5 * (fields[i] + fields[3 + i]) for i in range(3)]
 
     def _note_block(self, index, field, block):
         if index % block == 0:
@@ -103,13 +121,17 @@ class _Fit:  # equation (1) over points first..last, read with `gain`
         for i in range(3):
             mean[i] += field[i] / block
 
-    def gain(self):
-        return [self.response[i][i] / self._factory[i][i] for i in range(3)]
+    def better_gain(self, gain):
+        factory = self._calibration.FACTORY_GAIN_UT_PER_UNIT
+        return [gain[i] * self.response[i][i] / factory[i][i] for i in range(3)]
+
+    def better_offset(self, gain, offset):
+        slope = self._calibration.SLOPE_LSB_PER_UT
+        return [offset[i] + slope[i] * gain[i] * self._apart_ut[i] for i in range(3)]
 
     def step_ut(self):
-        if not self._block_means:
-            return 0.0
-        return max(max(m[i] for m in self._block_means) - min(m[i] for m in self._block_means) for i in range(3))
+        means = self._block_means
+        return max([max([m[i] for m in means]) - min([m[i] for m in means]) for i in range(3)]) if means else 0.0
 
 
 def current_ratio(points, trajectory):  # current read back over current asked for, by axis

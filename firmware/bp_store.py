@@ -29,14 +29,15 @@ class Stored:  # what is in force
 
 
 class Store:
-    def __init__(self, folder, calibration):  # calibration: its hash, 12 characters
+    def __init__(self, folder, calibration, factory_offset_lsb):  # calibration: its hash, 12 characters
         self._folder = folder
+        self._factory = Stored(FACTORY, 0, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), factory_offset_lsb, 0.0)
         self._calibration = calibration.encode()
         self.corrupt = ()  # names of slots that hold something that is no calibration
         self.foreign = ()  # names of slots that belong to another calibration
 
     def load(self):
-        best = Stored(FACTORY, 0, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+        best = self._factory
         self.corrupt = self.foreign = ()
         for slot in range(2):
             found = self._read(slot)

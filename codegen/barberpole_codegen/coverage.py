@@ -69,7 +69,8 @@ def coil_run(program: Program, fitted: Fitted, board: Board, temps_c: tuple[floa
         tried = conditions(range_ut, board, temps_c, largest)
         readings = _readings(fitted, inner, tried)
         readings |= dict(zip(("cx", "cy", "cz"), tried.coil_ut, strict=True))
-        return precision(program, readings, tried.field_ut + tried.coil_ut, range_ut)
+        own = tried.field_ut + tried.coil_ut
+        return precision(program, readings, np.concatenate([own, own]), range_ut)
 
     return _widest(attempt, board, "the field of the dies")
 

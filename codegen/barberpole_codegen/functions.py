@@ -33,7 +33,8 @@ def trace_undo_coil(fitted: Fitted) -> Program:
     def undo_coil(*given: Any) -> Sequence[Any]:
         set_xyz, reset_xyz, temp_c, gain = _unpack(given[:10])
         at = fitted.conditions(temp_c=temp_c, gain=gain, coil_ut=given[10:])
-        return die_fields(fitted.model, fitted.p, set_xyz, reset_xyz, at)
+        after_set, after_reset = die_fields(fitted.model, fitted.p, set_xyz, reset_xyz, at)
+        return *after_set, *after_reset
 
     return trace(undo_coil, READINGS + COILS)
 

@@ -71,7 +71,10 @@ def calibration_text(
     readings = "SET and RESET readings (LSB, both with the sign of SET), temperature (degC), gains over the factory's."
     comments = {
         "undo": (readings, "Field in uT, in the frame of the calibration."),
-        "undo_coil": (readings, "With coil fields (uT): the field that each die feels, its own coil's included."),
+        "undo_coil": (
+            readings,
+            "With coil fields (uT): what each die feels, its own coil included, from SET and from RESET.",
+        ),
         "in_frame": ("From the field of the dies to the frame of the calibration, uT.",),
     }
     return module(

@@ -80,7 +80,7 @@ def evaluate(program: Program, inputs: Mapping[str, np.ndarray], kind: type = np
 
 
 def precision(program: Program, inputs: Mapping[str, np.ndarray], truth: np.ndarray, range_ut: float) -> Precision:
-    """Error against `truth` (3, n) for readings `inputs`: narrowed and in float32, and as traced in double."""
+    """Error against `truth` (outputs, n) for readings `inputs`: narrowed and in float32, and as traced in double."""
     with np.errstate(all="ignore"):  # a root of a negative number shows up as NaN, and NaN is refused
         single = _largest(evaluate(narrow(program), inputs, np.float32), truth)
         double = _largest(evaluate(program, inputs, np.float64), truth)

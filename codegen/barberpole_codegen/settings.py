@@ -6,6 +6,8 @@ import math
 import numpy as np
 from barberpole.board import Board
 from barberpole.calibration import Calibration
+from barberpole.fitted import from_calibration
+from barberpole.selfcal import slope_lsb_per_ut
 from barberpole.trajectory import CodeTable
 
 from barberpole_codegen.emit import Constant, literal
@@ -50,6 +52,8 @@ def calibration_constants(calibration: Calibration, board: Board, table: CodeTab
         Constant("EFFECTS", tuple(calibration.model.effects)),
         Constant("HAS_FACTORY_REFERENCE", bool(calibration.selfcal)),
         Constant("FACTORY_GAIN_UT_PER_UNIT", tuple(narrowed(row) for row in factory), "row: axis, column: coil"),
+        Constant("FACTORY_OFFSET_LSB", narrowed(factory_offset(calibration)), "of the bridges, beyond the model's"),
+        Constant("SLOPE_LSB_PER_UT", narrowed(slope_lsb_per_ut(from_calibration(calibration)))),
         Constant("GAIN_DRIFT_LIMIT", narrowed((drift,))[0], "of a gain over the factory's"),
         Constant("RESIDUAL_LIMIT_UT", narrowed((residual_limit_ut(calibration, board),))[0], "rms of a run"),
     ]
@@ -64,6 +68,14 @@ def factory_response(calibration: Calibration, board: Board, table: CodeTable) -
     if reference is None:
         return np.diag(board.sensor.offset_coil_ut_per_ma * np.asarray(table.unit_ma))
     return np.asarray(reference.gain_ut_per_unit) * (np.asarray(table.unit_ma) / np.asarray(reference.units_ma))
+
+
+def factory_offset(calibration: Calibration) -> tuple[float, ...]:
+    """Electronic offset in LSB that a model fitted to demodulated readings knows nothing of; 0 where it has its own."""
+    fitted_already = any(name.startswith("bias.bridge_") for name in calibration.parameters)
+    if calibration.selfcal is None or fitted_already:
+        return 0.0, 0.0, 0.0
+    return calibration.selfcal.offset_lsb
 
 
 def residual_limit_ut(calibration: Calibration, board: Board) -> float:

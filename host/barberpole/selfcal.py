@@ -5,6 +5,8 @@ Each point gives the field h of the three dies; with u the coil currents in traj
     h_i = c_i + sum_j G_ij u_j                                                       (1)
     gain_i = G_ii / G_ii(factory)                                                    (2), thesis 6.7
 
+The bridge's law is curved, so h depends a little on the gains and on the electronic offset at which it is read: both
+are found by repeating, the offset from SET and RESET having to give the same field.
 What (1) can know and what not is said in firmware/bp_selfcal.py. Arrays are (3, m): x y z by m points.
 """
 
@@ -22,7 +24,7 @@ from barberpole.model import Model
 Array = np.ndarray
 
 UNKNOWNS = 4  # c and three G of each axis
-PASSES = 6  # each lessens the error of the gains at which the bridge's law is read by a factor of about 20
+PASSES = 6  # each lessens the error of gains and offsets, at which the bridge's law is read, at least twentyfold
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,15 @@ class SelfcalResult:
     temp_c: float
 
 
+@dataclass(frozen=True)
+class _Reading:
+    """How the points are read: field of one coil unit (3,), gains (3,), electronic offset beyond the model's (3,)."""
+
+    coil_ut_per_unit: Array
+    gain: Array
+    offset_lsb: Array
+
+
 def recompute(run: SelfcalRun, fitted: Fitted, factory_ut_per_unit: Array, block: int | None = None) -> SelfcalResult:
     """Eqs. (1) and (2). `factory_ut_per_unit` (3, 3) is the factory's response, of which the diagonal is used; `block`
     points make a balanced block, by default what the record says (0: no step is looked for).
@@ -47,16 +58,18 @@ def recompute(run: SelfcalRun, fitted: Fitted, factory_ut_per_unit: Array, block
     Raises InputError when the points do not determine (1).
     """
     factory = np.diag(np.asarray(factory_ut_per_unit, float))
-    gain = np.ones(3)
+    slope = slope_lsb_per_ut(fitted)
+    gain, offset = np.ones(3), np.zeros(3)
     for _ in range(PASSES):
-        field = fields(run, fitted, factory, gain)
+        field, drift_ut = _fields(run, fitted, _Reading(factory, gain, offset))
         ambient, response, residual = _solve(run.unit, field)
-        gain = gain * np.diag(response) / factory
+        apparent = response * gain[:, None]
+        gain, offset = gain * np.diag(response) / factory, offset + slope * gain * drift_ut
         if not np.all(np.isfinite(gain) & (gain > 0)):
             break
     return SelfcalResult(
         gain=gain,
-        response_ut=response * (gain * factory / np.diag(response))[:, None],
+        response_ut=apparent,
         ambient_ut=ambient,
         residual_ut=residual,
         step_ut=_step(field, run.header.get("block", 0) if block is None else block),
@@ -75,10 +88,12 @@ def factory_reference(run: SelfcalRun, fitted: Fitted, nominal_ut_per_ma: float)
         if key not in run.header:
             raise InputError(must("the coil run", f"one whose header gives {key}", "none"))
     unit_ma = np.asarray(run.header["unit_ma"], float)
-    coil = nominal_ut_per_ma * unit_ma
+    slope = slope_lsb_per_ut(fitted)
+    coil, offset = nominal_ut_per_ma * unit_ma, np.zeros(3)
     for _ in range(PASSES):
-        _, response, _ = _solve(run.unit, fields(run, fitted, coil, np.ones(3)))
-        coil = np.diag(response)
+        field, drift_ut = _fields(run, fitted, _Reading(coil, np.ones(3), offset))
+        _, response, _ = _solve(run.unit, field)
+        coil, offset = np.diag(response), offset + slope * drift_ut
     return SelfcalReference(
         gain_ut_per_unit=(_row(response[0]), _row(response[1]), _row(response[2])),
         units_ma=_row(unit_ma),
@@ -88,25 +103,33 @@ def factory_reference(run: SelfcalRun, fitted: Fitted, nominal_ut_per_ma: float)
     )
 
 
-def fields(run: SelfcalRun, fitted: Fitted, coil_ut_per_unit: Array, gain: Array) -> Array:
-    """Field that each die feels in µT, (3, m), its own coil's included."""
-    coil = np.asarray(coil_ut_per_unit)[:, None] * run.unit
-    at = fitted.conditions(temp_c=run.temp_c, coil_ut=coil, gain=tuple(gain))
-    return np.stack(die_fields(fitted.model, fitted.p, run.set_lsb, -run.reset_lsb, at))
+def die_fields(model: Model, p: Array, set_xyz, reset_xyz, at: Conditions) -> tuple[tuple, tuple]:
+    """Field that each die feels in µT, its own coil's included: from SET and from RESET readings (sign of SET).
 
-
-def die_fields(model: Model, p: Array, set_xyz, reset_xyz, at: Conditions) -> tuple:
-    """Field that each die feels in µT, its own coil's included, from readings with the sign of SET.
-
-    A coil sits on its die, so the effects of the space around (misalignment, soft iron) are not undone: they come
-    before `cross_field` in the stack. `cross_field` takes the coil's field off, here it is put back.
-    Runs on arrays and on the firmware generator's symbols.
+    The two agree where the bridge's electronic offset is the model's. A coil sits on its die, so the effects of the
+    space around (misalignment, soft iron) are not undone: they come before `cross_field` in the stack. `cross_field`
+    takes the coil's field off, here it is put back. Runs on arrays and on the firmware generator's symbols.
     """
     _, inner = split(model)
-    field = inner.undo_pair(set_xyz, reset_xyz, p, at)
-    if "cross_field" not in inner.effects:
-        return tuple(field)
-    return tuple(h + coil for h, coil in zip(field, at.coil_ut, strict=True))
+    coil = at.coil_ut if "cross_field" in inner.effects else (0.0, 0.0, 0.0)
+
+    def one(xyz, state: float) -> tuple:
+        field = inner.undo(xyz, p, replace(at, state=state))
+        return tuple(h + c for h, c in zip(field, coil, strict=True))
+
+    return one(set_xyz, 1.0), one(reset_xyz, -1.0)
+
+
+def slope_lsb_per_ut(fitted: Fitted) -> Array:
+    """(3,) LSB/µT of each die at zero field and the reference temperature, from the model."""
+    _, inner = split(fitted.model)
+    at = fitted.conditions(state=1.0, temp_c=np.full(2, fitted.t0_c), coil_ut=np.zeros((3, 2)))
+    slopes = []
+    for axis in range(3):
+        field = np.zeros((3, 2))
+        field[axis] = -1.0, 1.0
+        slopes.append(0.5 * np.diff(inner.predict(field, fitted.p, at)[axis])[0])
+    return np.array(slopes)
 
 
 def split(model: Model) -> tuple[Model, Model]:
@@ -117,6 +140,16 @@ def split(model: Model) -> tuple[Model, Model]:
     outer = tuple(term for term in model.terms if term.effect.name in outside)
     inner = tuple(term for term in model.terms if term.effect.name not in outside)
     return replace(model, terms=outer), replace(model, terms=inner)
+
+
+def _fields(run: SelfcalRun, fitted: Fitted, reading: _Reading) -> tuple[Array, Array]:
+    """Field of the dies (3, m), and half of what SET and RESET differ by, its mean (3,): both in µT."""
+    coil = reading.coil_ut_per_unit[:, None] * run.unit
+    at = fitted.conditions(temp_c=run.temp_c, coil_ut=coil, gain=tuple(reading.gain))
+    offset = reading.offset_lsb[:, None]
+    after_set, after_reset = die_fields(fitted.model, fitted.p, run.set_lsb - offset, offset - run.reset_lsb, at)
+    after_set, after_reset = np.stack(after_set), np.stack(after_reset)
+    return 0.5 * (after_set + after_reset), np.mean(0.5 * (after_set - after_reset), axis=1)
 
 
 def _solve(unit: Array, field: Array) -> tuple[Array, Array, Array]:
