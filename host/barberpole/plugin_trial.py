@@ -77,7 +77,7 @@ def _samples() -> Array:
 
 def _conditions(effect: Effect) -> Conditions:
     n, rng = SAMPLES, np.random.default_rng(1)
-    columns = {
+    columns: dict[str, Any] = {
         "t_s": np.cumsum(rng.uniform(0.005, 0.015, n)),
         "temp_c": rng.uniform(15.0, 35.0, n),
         "load_a": rng.uniform(0.0, 10.0, n),
@@ -175,15 +175,13 @@ def _sizes(trial: Trial) -> Array:
 
 def _takes_complex(trial: Trial) -> bool:
     """Whether the complex step gives what differences give: abs, float and comparisons on the way can spoil it."""
-    two = [
-        slopes(trial.effect.forward, _sizes(trial), trial.effect.memory, d) for d in (by_complex_step, by_differences)
-    ]
-    plain = two[1](trial.field, trial.typical, trial.at)
+    forward, sizes, memory = trial.effect.forward, _sizes(trial), trial.effect.memory
+    plain = slopes(forward, sizes, memory, by_differences)(trial.field, trial.typical, trial.at)
     try:
-        steps = two[0](trial.field, trial.typical, trial.at)
+        steps = slopes(forward, sizes, memory, by_complex_step)(trial.field, trial.typical, trial.at)
     except Exception:  # noqa: BLE001 - whatever forward raises on complex numbers, differences serve instead
         return False
-    return all(_agree(a, b) for a, b in zip(steps, plain, strict=True) if b is not None)
+    return all(_agree(np.asarray(a), b) for a, b in zip(steps, plain, strict=True) if b is not None)
 
 
 def _agree(one: Array, other: Array) -> bool:

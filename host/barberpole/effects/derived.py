@@ -58,7 +58,7 @@ def carrier(forward: Forward, derive: Directional):
     """A `tangent` for an effect with memory: one evaluation or two for each derivative carried."""
 
     def tangent(xyz, p, at: Conditions, chain):
-        x, out = np.asarray(xyz), np.empty(np.shape(chain))
+        x, out = np.asarray(xyz), np.zeros_like(chain, float)
         span = max(float(np.max(np.abs(x), initial=0.0)), 1e-9)
         for k in range(out.shape[1]):
             largest = float(np.max(np.abs(chain[:, k]), initial=0.0))
