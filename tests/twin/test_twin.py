@@ -87,6 +87,17 @@ def test_ticks_wrap_as_on_the_board(start, mpremote):
     assert mpremote(start(), "exec", program).split() == ["True", "-10", "5"]
 
 
+def test_power_cycles_in_quick_succession(start, said):
+    """Descriptors of one start come back as those of the next: no event may be mistaken for another's."""
+    twin = start("forever.py")
+    for n in range(12):
+        twin.power_cycle()
+        if n % 3:
+            twin.wait_until(0.05)
+    twin.wait_until(0.5)
+    assert twin.is_on
+
+
 def test_kill_and_power_cycle_at_any_moment_keep_the_files(start, mpremote):
     twin = start("writer.py")
     for n in range(6):

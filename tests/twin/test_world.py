@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from barberpole.errors import InputError
-from barberpole.twin import HIDDEN, Constant, Cycle, Fixed, Stations, Stepped, Tumble, World
+from barberpole.twin import HIDDEN, Constant, Cycle, Fixed, Plateaus, Stations, Stepped, Tumble, World
 
 
 def test_stations_hold_and_step():
@@ -54,6 +54,12 @@ def test_temperature_cycles_up_and_down_between_its_ends():
     assert world.constant_until(0.3) == 1.0
     assert world.constant_until(2.0) == 2.0
     assert World(temperature=Constant(7.0)).temp(3.0).tolist() == [7.0]
+
+
+def test_temperature_rests_on_plateaus():
+    world = World(temperature=Plateaus((25.0, 40.0, 10.0), hold_s=2.0, rest_s=1.0))
+    assert world.temp([0.0, 2.9, 3.1, 4.9, 5.1, 60.0]).tolist() == [25.0, 25.0, 40.0, 40.0, 10.0, 10.0]
+    assert [world.constant_until(t) for t in (0.5, 1.5, 3.0, 5.5)] == [3.0, 3.0, 5.0, math.inf]
 
 
 def test_only_the_named_effects_are_there(board):

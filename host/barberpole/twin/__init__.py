@@ -6,7 +6,19 @@ Nothing here imports barberpole.effects, fit or model: the truth that the board 
 from barberpole.twin.ambient import Fixed, Stations, Stepped, Tumble
 from barberpole.twin.api import Twin
 from barberpole.twin.faults import FAULTS
-from barberpole.twin.temperature import Constant, Cycle
+from barberpole.twin.temperature import Constant, Cycle, Plateaus
 from barberpole.twin.world import HIDDEN, World
 
-__all__ = ["FAULTS", "HIDDEN", "Constant", "Cycle", "Fixed", "Stations", "Stepped", "Tumble", "Twin", "World"]
+__all__ = [
+    "FAULTS",
+    "HIDDEN",
+    "Constant",
+    "Cycle",
+    "Fixed",
+    "Plateaus",
+    "Stations",
+    "Stepped",
+    "Tumble",
+    "Twin",
+    "World",
+]

@@ -61,8 +61,11 @@ class BoardProcess:
                 if now_s >= look_at:
                     self._look(now_s)
                     look_at = now_s + LOOK_S
+                running = self._running
                 for fd, _ in self._poll.poll(1000.0 * LOOK_S):
                     self._serve(fd)
+                    if self._running is not running:
+                        break  # the other events may be of descriptors that mean something else now
         except EOFError:
             self._power_off()
             self._port.close()
