@@ -78,7 +78,8 @@ def tangent(xyz, p, at: Conditions, chain):
         for axis in range(3):
             one = chain[axis][..., samples]
             for w, r in zip(weights[:, axis], widths, strict=True):
-                out[axis][..., samples] += w * (one[..., contacts(x[axis, samples], r)[0]] - one)
+                moved_by = np.take(one, contacts(x[axis, samples], r)[0], axis=-1)
+                out[axis][..., samples] += w * (moved_by - one)
     return out
 
 

@@ -32,9 +32,10 @@ def undo(xyz, p, at: Conditions):
 def jacobian(xyz, p, at: Conditions):
     """Slopes of (1)."""
     x = np.asarray(xyz)
-    shrink = 1.0 / np.sqrt(1.0 + np.asarray(p, float)[:, None] * x * x)
-    steep = shrink**3
-    return steep, -0.5 * x**3 * steep
+    square = x * x
+    rise = 1.0 + np.asarray(p, float)[:, None] * square
+    steep = 1.0 / (rise * np.sqrt(rise))
+    return steep, -0.5 * x * square * steep
 
 
 SATURATION = Effect(

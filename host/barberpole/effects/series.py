@@ -73,9 +73,9 @@ def high_pass(y: Array, dt: Array, tau_s) -> Array:
 
 def filtered(rows: Array, taus, at: Conditions, one) -> Array:
     """one(row, dt, tau) applied to each axis of rows (3, ..., n), each series apart."""
-    out = np.array(rows)
+    out = np.empty_like(rows)
     for samples in streams(at, out.shape[-1]):
         dt = intervals(np.asarray(at.t_s)[samples])
         for axis, tau in enumerate(taus):
-            out[axis][..., samples] = one(out[axis][..., samples], dt, tau)
+            out[axis][..., samples] = one(rows[axis][..., samples], dt, tau)
     return out
