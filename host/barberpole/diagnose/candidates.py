@@ -46,7 +46,7 @@ def candidates(ground: Ground, absent: Absent) -> list[Candidate]:
             continue
         for shape, setup in _forms(ground, absent, effect):
             one = candidate(ground, effect, shape, setup.settings, setup)
-            if one.columns.shape[1] and np.all(np.isfinite(one.columns)):
+            if one.names and all(np.all(np.isfinite(rows)) for _, rows in one.parts):
                 found.append(one)
     return found
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from barberpole.chain import UNIT, add_columns, full, solve3, sum_slopes, through
+from barberpole.diagnose.table import Parts, parts_of
 from barberpole.effects import Conditions, Effect, Setup, in_order
 from barberpole.effects.effect import Shape, spread
 from barberpole.fit.fit import Fit
@@ -21,7 +22,8 @@ NONE = np.zeros((3, 0, 1))
 
 @dataclass(frozen=True)
 class Candidate:
-    """One form of an absent effect: columns (m, K, n) in LSB per parameter unit and the `names` of their parameters.
+    """One form of an absent effect: its columns by channel in LSB per parameter unit, and the `names` of their
+    parameters.
 
     start: of a refit, by name; linear: the least-squares weights are better ones. even: a parameter of no sign, whose
     column is a secant because its derivative at the null is zero.
@@ -29,7 +31,7 @@ class Candidate:
 
     effect: Effect
     setup: Setup
-    columns: np.ndarray
+    parts: Parts
     names: tuple[str, ...]
     typical: np.ndarray
     linear: bool
@@ -73,6 +75,16 @@ class Ground:
             return columns
         u, v, w = self.normal
         return (u * columns[0] + v * columns[1] + w * columns[2])[None]
+
+    def seen_by_channel(self, parts: Parts) -> Parts:
+        """The same for columns by channel."""
+        if self.normal is None:
+            return parts
+        count = max((int(index.max()) + 1 for index, _ in parts if index.size), default=0)
+        total = np.zeros((count, self.field.shape[1]))
+        for u, (index, rows) in zip(self.normal, parts, strict=True):
+            total[index] += u * rows
+        return [(np.arange(count), total)]
 
     def unflipped(self) -> "Ground":
         """The same with readings of unknown state taken as of one magnetisation."""
@@ -138,39 +150,77 @@ def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, 
     wanted = np.array([q.name in shape.columns if shape.columns else not q.inner for q in params])
     typical = np.array([q.typical or 1.0 for q in params])
     columns, even = _columns(ground, effect, null, typical, wanted, float(shape.secant))
-    columns = ground.seen_through(columns)
-    start = {
-        q.name: q.null + shape.secant * t if shape.secant else q.first for q, t in zip(params, typical, strict=True)
-    }
+    first = null + shape.secant * typical if shape.secant else np.array([q.first for q in params])
+    start = dict(zip(names, (float(v) for v in first), strict=True))
     start |= shape.inner
     picked = tuple(name for name, w in zip(names, wanted, strict=True) if w)
-    return Candidate(effect, setup, columns, picked, typical[wanted], not shape.secant, even, start, shape.tried)
+    return Candidate(
+        effect,
+        setup,
+        ground.seen_by_channel(columns),
+        picked,
+        typical[wanted],
+        not shape.secant,
+        even,
+        start,
+        shape.tried,
+    )
 
 
-def _columns(ground, effect, null, typical, wanted, secant: float) -> tuple[np.ndarray, np.ndarray]:
-    """(3, K, n) for the wanted parameters, and which of them are even."""
+def _columns(ground, effect, null, typical, wanted, secant: float) -> tuple[Parts, np.ndarray]:
+    """Readings' columns of the wanted parameters, and which of them are even."""
     picked = np.flatnonzero(wanted)
     if secant:
         columns = [_secant(ground, effect, null, int(j), secant * typical[j]) for j in picked]
-        return np.stack(columns, axis=1), np.zeros(picked.size, bool)
-    columns = _derivative(ground, effect, null)[:, picked]
-    size = np.sqrt(np.sum(columns**2, axis=(0, 2))) * np.abs(typical[picked])
-    even = size <= FLAT * size.max(initial=0.0)
+        return parts_of(np.stack(columns, axis=1)), np.zeros(picked.size, bool)
+    parts = [_only(index, rows, picked) for index, rows in _derivative(ground, effect, null)]
+    energy = sum(np.bincount(i, np.einsum("kn,kn->k", r, r), picked.size) for i, r in parts)
+    size = np.sqrt(np.asarray(energy)) * np.abs(typical[picked])
+    even = size <= FLAT * np.max(size, initial=0.0)
+    if not even.any():
+        return parts, even
+    dense = _dense(parts, picked.size, ground.field.shape[1])
     for i in np.flatnonzero(even):
-        columns[:, i] = _secant(ground, effect, null, int(picked[i]), typical[picked[i]])
-    return columns, even
+        dense[:, i] = _secant(ground, effect, null, int(picked[i]), typical[picked[i]])
+    return parts_of(dense), even
 
 
-def _derivative(ground: Ground, effect: Effect, p: np.ndarray) -> np.ndarray:
+def _only(index: np.ndarray, rows: np.ndarray, picked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The picked columns of one channel, renumbered."""
+    kept = np.isin(index, picked)
+    return np.searchsorted(picked, index[kept]), rows if kept.all() else rows[kept]
+
+
+def _dense(parts: Parts, count: int, n: int) -> np.ndarray:
+    out = np.zeros((len(parts), count, n))
+    for channel, (index, rows) in enumerate(parts):
+        out[channel, index] = rows
+    return out
+
+
+def _derivative(ground: Ground, effect: Effect, p: np.ndarray) -> Parts:
     stage, n = _stage(ground, effect), ground.field.shape[1]
+    slopes = [effect.linearise(path.inputs[stage], p, path.at)[2] for path in ground.pathways]
+    tails = [path.tails[stage] for path in ground.pathways]
+    straight = not any(term.effect.tangent for term in ground.fit.model.terms[stage:])
+    if straight and all(d.ndim == 2 for d in slopes) and all(t.ndim == 2 for t in tails):
+        return [_own_axis(ground, slopes, tails, axis, n) for axis in range(3)]
     total = np.zeros((3, len(p), n))
-    for path in ground.pathways:
-        d_p = effect.linearise(path.inputs[stage], p, path.at)[2]
+    for path, d_p in zip(ground.pathways, slopes, strict=True):
         total += path.weight * _carry(ground, path, stage, d_p, n)
-    return total
+    return parts_of(total)
+
+
+def _own_axis(ground: Ground, slopes, tails, axis: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Parameter j acts on axis j % 3 alone, all the way to the reading."""
+    weighted = zip(ground.pathways, slopes, tails, strict=True)
+    rows = sum(path.weight * t[axis] * d[axis::3] for path, d, t in weighted)
+    index = np.arange(axis, slopes[0].shape[0], 3)
+    return index, np.broadcast_to(np.asarray(rows), (index.size, n))
 
 
 def _secant(ground: Ground, effect: Effect, null: np.ndarray, j: int, size: float) -> np.ndarray:
+    """(3, n): the change of the readings over `size` of parameter j, per unit of it."""
     p = null.copy()
     p[j] += size
     stage, n = _stage(ground, effect), ground.field.shape[1]

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from barberpole.diagnose.columns import Ground, ground_of
+from barberpole.diagnose.columns import Ground
 from barberpole.diagnose.covariates import covariates
+from barberpole.diagnose.evidence import examine
 from barberpole.diagnose.noise import Noise
-from barberpole.diagnose.patterns import Pattern, background, patterns, survey
+from barberpole.diagnose.patterns import Pattern, patterns
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
@@ -57,9 +58,10 @@ class Comparison:
 
 def compare(fit: Fit, noise: Noise | None = None, extra: Sequence[Effect] = ()) -> Comparison:
     """What is left of the readings under a fit. `noise`: of the sensor at rest, else taken from the residual."""
-    ground = ground_of(fit, extra)
+    evidence = examine(fit, None, None, extra)
+    ground = evidence.ground
     axes = axes_of(ground)
-    noise = background(ground) if noise is None else noise
+    noise = evidence.background() if noise is None else noise
     white = whitening(noise, fit.problem.n, ground.normal)
     return Comparison(
         n=fit.problem.n,
@@ -68,7 +70,7 @@ def compare(fit: Fit, noise: Noise | None = None, extra: Sequence[Effect] = ()) 
         rms_norm_percent=fit.rms_norm_percent(),
         rms_by_axis_lsb={a: float(np.sqrt(np.mean(r**2))) for a, r in zip(axes, ground.residual, strict=True)},
         noise_lsb=noise.rms(fit.problem.n),
-        patterns=tuple(patterns(survey(ground, white))),
+        patterns=tuple(patterns(evidence.under(white))),
         curves=tuple(_curves(ground, noise)),
         spectrum=_spectrum(ground),
         sphere=_sphere(ground),

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from barberpole.diagnose.candidates import Absent, absent_effects, candidates
-from barberpole.diagnose.columns import ground_of
+from barberpole.diagnose.candidates import Absent, absent_effects
+from barberpole.diagnose.evidence import Evidence, examine
 from barberpole.diagnose.experiments import next_experiment
 from barberpole.diagnose.noise import estimate
-from barberpole.diagnose.patterns import Pattern, Survey, background, jump_patterns, patterns, survey
-from barberpole.diagnose.search import Evidence, Found, bic_gain, recheck, search
-from barberpole.diagnose.whitening import Whitening, whitening
+from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
+from barberpole.diagnose.search import Found, recheck, search
+from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
 from barberpole.fit.fit import Fit, fit_observations
@@ -94,10 +94,12 @@ def diagnose_observations(
     lack = _geometry(fit)
     if lack:
         return _inconclusive(seen, lack, fit, absent)
-    white = _whitening(fit, absent, rest, extra)
-    found, evidence = search(fit, absent, white, extra)
-    found = recheck(fit, found, white, extra)
-    return _conclude(fit, absent, white, found, evidence, extra)
+    first = examine(fit, absent, None, extra)
+    noise = first.background() if rest is None else estimate(rest.y, "rest")
+    first = first.under(whitening(noise, fit.problem.n, first.ground.normal))
+    found, last = search(first, absent, extra)
+    found = recheck(found, first.white, extra)
+    return _conclude(first, last, absent, found)
 
 
 def _about_its_temperature(seen: Observations) -> Observations:
@@ -122,34 +124,23 @@ def _geometry(fit: Fit) -> str:
     return ""
 
 
-def _whitening(fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[Effect]) -> Whitening:
-    """By the noise of a record at rest, else of what no effect and no covariate explains."""
-    ground = ground_of(fit, extra)
-    if rest is None:
-        noise = background(ground, [c.columns for c in candidates(ground, absent)])
-    else:
-        noise = estimate(rest.y, "rest")
-    return whitening(noise, fit.problem.n, ground.normal)
-
-
-def _conclude(fit, absent, white, found: list[Found], evidence: Evidence, extra) -> Diagnosis:
-    left = survey(evidence.ground, white)
-    remains = _remains(left)
-    covered = _covered(found, left)
-    verdict = _verdict(found, covered, bool(remains))
+def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found]) -> Diagnosis:
+    """The verdict from the evidence beside the model given and beside it with all effects found."""
+    remains = _remains(last)
+    verdict = _verdict(found, _covered(found, last), bool(remains))
     if verdict == "unexplained":
-        found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, left)]
-    shown = remains if verdict == "unexplained" or not found else patterns(survey(ground_of(fit, extra), white))
-    visible = _visibility(evidence)
+        found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, last)]
+    visible = _visibility(last)
     blind = tuple(n for n, v in visible.items() if v < BLIND)
     groups = [(f.effect, *f.rivals) for f in found if f.rivals]
+    fit, white = first.fit, first.white
     return Diagnosis(
         verdict=verdict,
         n=fit.problem.n,
         noise_lsb=white.noise.rms(fit.problem.n),
         rms_lsb=fit.rms_lsb,
         suspects=tuple(map(_suspect, found)),
-        patterns=tuple(shown),
+        patterns=tuple(remains if verdict == "unexplained" else patterns(first)),
         cannot_be_seen=blind,
         cannot_be_judged=absent.unjudged,
         next_experiment=next_experiment(verdict, groups, blind, remains if found else []),
@@ -158,21 +149,20 @@ def _conclude(fit, absent, white, found: list[Found], evidence: Evidence, extra)
     )
 
 
-def _remains(left: Survey) -> list[Pattern]:
+def _remains(left: Evidence) -> list[Pattern]:
     """What is significant in a residual: dependence on a covariate by its gain in BIC, and jumps."""
-    rss, count = left.projection.rss, left.table.count
-    gain = max((bic_gain(rss, *left.projection.score(columns), count) for _, _, columns in left.places), default=0.0)
+    gain = max((left.gain(columns) for _, _, columns in left.covariates), default=0.0)
     found = jump_patterns(left)
-    return found + patterns(left) if gain > ENOUGH + 2 * np.log(len(left.places)) else found
+    return found + patterns(left) if gain > ENOUGH + 2 * np.log(len(left.covariates)) else found
 
 
-def _explainable(found: list[Found], left: Survey) -> float:
+def _explainable(found: list[Found], left: Evidence) -> float:
     """Whitened sum of squares that effects found and covariates together take."""
-    score, rank = left.projection.score(left.everything)
+    score, rank = left.projection.score(left.all_covariates)
     return sum(f.fall for f in found) + max(score - rank, 0.0)
 
 
-def _covered(found: list[Found], left: Survey) -> float:
+def _covered(found: list[Found], left: Evidence) -> float:
     """Part of all that can be explained that the effects found explain."""
     return sum(f.fall for f in found) / max(_explainable(found, left), 1e-300)
 
@@ -186,7 +176,7 @@ def _verdict(found: list[Found], covered: float, leftover: bool) -> str:
 def _visibility(evidence: Evidence) -> dict[str, float]:
     """Of each absent effect, the largest part of its RMS that survives the baseline."""
     out: dict[str, float] = {}
-    for shape, columns in zip(evidence.shapes, evidence.places, strict=True):
+    for shape, columns in zip(evidence.candidates, evidence.places, strict=True):
         name = shape.effect.name
         out[name] = max(out.get(name, 0.0), evidence.projection.visibility(columns))
     return out

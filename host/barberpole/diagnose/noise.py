@@ -71,9 +71,9 @@ def estimate(
     n = channels.shape[1]
     bins, f = _edges(n), frequencies(n)
     power = np.abs(rfft(channels - channels.mean(axis=1, keepdims=True), axis=1)) ** 2 / n
-    kept = np.ones_like(power) if kept is None else kept
-    part = np.maximum(_binned(kept, bins), LEAST_KEPT)
-    binned, weight = _binned(power, bins) / part, np.diff(bins) * part
+    kept = np.ones(power.shape) if kept is None else kept
+    part = _binned(kept, bins)
+    binned, weight = _binned(power, bins) / np.maximum(part, LEAST_KEPT), np.diff(bins) * np.maximum(part, 1e-9)
     turning = None if normal is None else _turning(normal)
     trials = [(0.0, 1.0)] + [(c, a) for c in CORNERS[1.0 / n < CORNERS] for a in EXPONENTS]
     shapes = [_binned(_seen_turning(power_law(f, c, a), turning, n)[None], bins)[0] for c, a in trials]

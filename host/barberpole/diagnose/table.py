@@ -1,69 +1,77 @@
-"""One Gram matrix of baseline, candidates and residual, by contiguous blocks: every score follows from it."""
+"""One Gram matrix of baseline, candidates, covariates and residual, by contiguous blocks: all scores follow from it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.whitening import Whitening
 from barberpole.fit.gram import BLOCKS, FOLDS, block_edges
 
 ALIKE = 1e-8  # squared sine of the angle between columns below which they are one
 SEEN = 2.5e-3  # of a column's energy that must survive the baseline: 5 % of its RMS
+CHUNK = 4096  # samples multiplied at a time, so that they stay in the cache
+LONG = 20_000  # samples; above, the few frequencies a fit can empty are simply left out
+EMPTIED = 64  # of them
+
+Parts = list[tuple[np.ndarray, np.ndarray]]
+"""Columns by channel: which of them are not zero there (k,), and those (k, n)."""
+
+
+def parts_of(columns: np.ndarray) -> Parts:
+    """Dense columns (m, K, n) as parts."""
+    filled = [np.flatnonzero(np.any(block, axis=1)) for block in columns]
+    return [(index, block[index]) for index, block in zip(filled, columns, strict=True)]
 
 
 class Design:
     """Columns of the residual channels; a column that is zero in a channel takes no room there."""
 
     def __init__(self, channels: int):
-        self.rows: list[list[np.ndarray]] = [[] for _ in range(channels)]
-        self.index: list[list[np.ndarray]] = [[] for _ in range(channels)]
+        self.parts: list[Parts] = [[] for _ in range(channels)]
         self.count = 0
 
-    def add(self, columns: np.ndarray) -> np.ndarray:
-        """Columns (m, K, n) -> their numbers (K,)."""
-        for channel, block in enumerate(columns):
-            filled = np.flatnonzero(np.any(block, axis=1))
-            if filled.size:
-                self.rows[channel].append(block[filled])
-                self.index[channel].append(filled + self.count)
-        numbers = np.arange(self.count, self.count + columns.shape[1])
-        self.count += columns.shape[1]
-        return numbers
+    def add(self, parts: Parts, count: int) -> np.ndarray:
+        """`count` columns -> their numbers (count,)."""
+        for channel, (index, rows) in enumerate(parts):
+            if index.size:
+                self.parts[channel].append((index + self.count, rows))
+        return self._numbered(count)
 
     def add_to(self, channel: int, rows: np.ndarray) -> np.ndarray:
         """Rows (K, n) that act on one channel only -> their numbers (K,)."""
-        numbers = np.arange(self.count, self.count + len(rows))
-        self.rows[channel].append(rows)
-        self.index[channel].append(numbers)
-        self.count += len(rows)
-        return numbers
+        self.parts[channel].append((np.arange(self.count, self.count + len(rows)), rows))
+        return self._numbered(len(rows))
+
+    def _numbered(self, count: int) -> np.ndarray:
+        self.count += count
+        return np.arange(self.count - count, self.count)
 
     def combine(self, weights: np.ndarray) -> np.ndarray:
         """Sum of columns times weights (count,), (m, n)."""
-        return np.stack(
-            [
-                sum((weights[i] @ r for i, r in zip(index, rows, strict=True)), np.zeros(1))
-                for index, rows in zip(self.index, self.rows, strict=True)
-            ]
-        )
+        return np.stack([sum((weights[i] @ r for i, r in parts), np.zeros(1)) for parts in self.parts])
 
-    def kept(self) -> np.ndarray:
-        """(m, n // 2 + 1): part of white noise that a fit by all columns but the last leaves at each frequency."""
-        return np.stack(
-            [
-                _kept(np.concatenate(rows)[np.concatenate(index) < self.count - 1])
-                for rows, index in zip(self.rows, self.index, strict=True)
-            ]
-        )
+    def kept(self, products: "Products") -> np.ndarray:
+        """(m, n // 2 + 1): part of white noise that a fit by all columns but the last leaves at each frequency.
+
+        In a long log the fit takes a few low frequencies and next to nothing of the rest.
+        """
+        n = self.parts[0][0][1].shape[1]
+        if n > LONG:
+            out = np.ones((len(self.parts), n // 2 + 1))
+            out[:, :EMPTIED] = 0.0
+            return out
+        channels = zip(self.parts, products.channels, strict=True)
+        return np.stack([_kept(np.concatenate([r for _, r in parts[:-1]]), gram) for parts, (_, gram) in channels])
 
 
-def _kept(columns: np.ndarray) -> np.ndarray:
-    n = columns.shape[1]
-    columns = columns / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)[:, None]
-    values, vectors = np.linalg.eigh(columns @ columns.T)
+def _kept(columns: np.ndarray, gram: np.ndarray) -> np.ndarray:
+    total = gram.sum(axis=0)[:-1, :-1]
+    size = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    values, vectors = np.linalg.eigh(total / np.outer(size, size))
     used = values > ALIKE
-    basis = (vectors[:, used] / np.sqrt(values[used])).T @ columns
-    return 1.0 - np.sum(np.abs(np.fft.rfft(basis, axis=1)) ** 2, axis=0) / n
+    basis = (vectors[:, used] / np.sqrt(values[used]) / size[:, None]).T @ columns
+    return 1.0 - np.sum(np.abs(np.fft.rfft(basis, axis=1)) ** 2, axis=0) / columns.shape[1]
 
 
 @dataclass(frozen=True)
@@ -82,20 +90,49 @@ class Table:
         return float(self.m.sum())
 
 
-def tabulate(design: Design, white: Whitening) -> Table:
-    """Whiten every column and accumulate. The residual must have been added last."""
-    gram = np.zeros((BLOCKS, design.count, design.count))
-    m = np.zeros(BLOCKS)
-    for channel, (rows, index) in enumerate(zip(design.rows, design.index, strict=True)):
-        if not rows:
-            continue
-        whitened, numbers = white.apply(channel, np.concatenate(rows)), np.concatenate(index)
-        edges = block_edges(whitened.shape[1])
+@dataclass(frozen=True)
+class Products:
+    """Per channel: numbers of its columns (k,), Gram by blocks (B, k, k) in whatever units the columns have."""
+
+    channels: list[tuple[np.ndarray, np.ndarray]]
+    m: np.ndarray
+    count: int
+
+    def table(self, noise: Noise | None = None) -> Table:
+        """All channels together, each over its white level."""
+        gram = np.zeros((BLOCKS, self.count, self.count))
+        for channel, (numbers, part) in enumerate(self.channels):
+            level = 1.0 if noise is None else noise.white[channel]
+            gram[:, numbers[:, None], numbers] += part / level
+        return Table(gram, self.m * len(self.channels))
+
+
+def multiply(design: Design) -> Products:
+    """The Gram matrices of the columns as they are."""
+    n = design.parts[0][0][1].shape[1]
+    edges = block_edges(n)
+    channels = []
+    for parts in design.parts:
+        numbers = np.concatenate([index for index, _ in parts])
+        gram = np.zeros((BLOCKS, numbers.size, numbers.size))
         for block in range(BLOCKS):
-            part = whitened[:, edges[block] : edges[block + 1]]
-            gram[block][np.ix_(numbers, numbers)] += part @ part.T
-            m[block] += part.shape[1]
-    return Table(gram, m)
+            for at in range(edges[block], edges[block + 1], CHUNK):
+                part = np.concatenate([rows[:, at : min(at + CHUNK, edges[block + 1])] for _, rows in parts])
+                gram[block] += part @ part.T
+        channels.append((numbers, gram))
+    return Products(channels, np.diff(edges).astype(float), design.count)
+
+
+def tabulate(design: Design, white: Whitening, products: Products | None = None) -> Table:
+    """Gram of the whitened columns; of white noise from `products` where they are known."""
+    if not white.filter:
+        return (products or multiply(design)).table(white.noise)
+    whitened = Design(len(design.parts))
+    whitened.count = design.count
+    for channel, parts in enumerate(design.parts):
+        rows = white.apply(channel, np.concatenate([r for _, r in parts]))
+        whitened.parts[channel].append((np.concatenate([i for i, _ in parts]), rows))
+    return multiply(whitened).table()
 
 
 @dataclass(frozen=True)
@@ -112,6 +149,10 @@ class Projection:
 
     def score(self, columns: np.ndarray) -> tuple[float, int]:
         """Fall of the residual sum of squares by these columns, and how many directions of them can be seen."""
+        if len(columns) == 1:
+            own = self.matrix[columns[0], columns[0]]
+            seen = own > SEEN * self.energy[columns[0]] and own > 0
+            return (float(self.matrix[columns[0], -1] ** 2 / own), 1) if seen else (0.0, 0)
         weights, rank = self.weights(columns)
         return float(weights @ self.matrix[columns, -1]), rank
 

@@ -19,6 +19,16 @@ def wrong_readings(z: np.ndarray) -> float:
     return 0.0 if alike > CLUMPED else two_populations(z.ravel())
 
 
+def beside_neighbours(residual: np.ndarray) -> np.ndarray:
+    """Residuals (m, n) less the mean of the two on either side: in coloured noise an outlier then stands alone.
+
+    Whitening would smear it over what follows, and a median is not Gaussian.
+    """
+    padded = np.pad(residual, ((0, 0), (2, 2)), mode="reflect")
+    n = residual.shape[1]
+    return residual - 0.25 * sum(padded[:, at : at + n] for at in (0, 1, 3, 4))
+
+
 def jumps(residual: np.ndarray) -> np.ndarray:
     """Evidence (m,) for jumps between levels in residuals (m, n), whatever their colour.
 
