@@ -21,6 +21,7 @@ from barberpole.verify import verify
 
 GAIN_DRIFT = (1.004, 0.997, 1.002)
 PATIENCE_S = 20.0
+FLOAT32 = 1.2e-7  # the slots hold float32; the interpreter here computes in double
 SEEDS = 20
 CUTS = 30
 REASON = {
@@ -106,8 +107,8 @@ def test_a_fault_is_refused_with_its_reason_and_the_last_good_one_stays(board, f
     result = power_up(board, seed=2, faults=(fault,))
     assert not result["accepted"]
     assert REASON[fault] in names(result)
-    for key in ("in_force", "seq", "in_force_gain"):
-        assert result[key] == good[key]
+    assert (result["in_force"], result["seq"]) == (good["in_force"], good["seq"])
+    assert result["in_force_gain"] == pytest.approx(good["in_force_gain"], rel=FLOAT32)
 
 
 def test_the_plug_pulled_at_any_moment_leaves_a_valid_calibration(board, calibration):

@@ -35,7 +35,7 @@ def demo(
     rows = (FACTORY_FIELDS + 2 * TODAY_FIELDS) * ROWS_PER_FIELD
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     began = time.monotonic()
-    with Progress(*columns, console=ERR, transient=True) as bar:
+    with Progress(*columns, console=ERR, transient=True, disable=not ERR.is_terminal) as bar:
         task = bar.add_task("demo", total=rows)
 
         def chapter(title: str) -> None:

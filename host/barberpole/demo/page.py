@@ -54,20 +54,18 @@ def _where(outcome: Outcome) -> Section:
 
 
 def _worst_curves(found: Comparison) -> list[go.Figure]:
-    """The residual of the axis that fails worst, against what it follows."""
-    if not found.patterns:
+    """The residual against the covariate that it follows most, of those that can be drawn as a curve."""
+    curves = {(c.axis, c.against): c for c in found.curves}
+    drawn = [curves[p.axis, p.against] for p in found.patterns if (p.axis, p.against) in curves]
+    if not drawn:
         return []
-    worst = found.patterns[0]
-    curve = next((c for c in found.curves if (c.axis, c.against) == (worst.axis, worst.against)), None)
-    if curve is None:
-        return []
+    curve = drawn[0]
     bars = {"type": "data", "array": [2 * e for e in curve.error_lsb], "thickness": 1}
-    figure = go.Figure(
-        go.Scatter(x=curve.x, y=curve.mean_lsb, error_y=bars, mode="markers", marker={"color": BEFORE, "size": 8})
-    )
+    dots = {"color": BEFORE, "size": 8}
+    figure = go.Figure(go.Scatter(x=curve.x, y=curve.mean_lsb, error_y=bars, mode="markers", marker=dots))
     figure.add_hline(y=0, line={"color": NOISE, "width": 1})
-    title = f"Residual of {worst.axis} against {worst.against}: bin means with two standard errors"
-    return [style(figure, title, worst.against, "residual, LSB")]
+    title = f"Residual of {curve.axis} against {curve.against}: bin means with two standard errors"
+    return [style(figure, title, curve.against, "residual, LSB")]
 
 
 def _suspects(outcome: Outcome) -> Section:
@@ -84,20 +82,19 @@ def _suspects(outcome: Outcome) -> Section:
 def _fall(outcome: Outcome) -> Section:
     answer = outcome.to_json()
     names = ["on the log", "held out"]
-    figure = go.Figure(
-        [
-            go.Bar(
-                name="before", x=names, y=[answer["rms_before_lsb"], answer["heldout_before_lsb"]], marker_color=BEFORE
-            ),
-            go.Bar(name="after", x=names, y=[answer["rms_after_lsb"], answer["heldout_after_lsb"]], marker_color=AFTER),
-        ]
-    )
-    figure.add_hline(
-        y=outcome.noise_lsb, line={"color": "#000", "dash": "dot"}, annotation_text=f"noise {outcome.noise_lsb:.1f} LSB"
-    )
+    bars = []
+    for when, colour in (("before", BEFORE), ("after", AFTER)):
+        values = [answer[f"rms_{when}_lsb"], answer[f"heldout_{when}_lsb"]]
+        labels = [f"{v:.1f}" for v in values]
+        bars.append(go.Bar(name=when, x=names, y=values, text=labels, textposition="auto", marker_color=colour))
+    figure = go.Figure(bars)
+    noise = f"noise {outcome.noise_lsb:.1f} LSB"
+    figure.add_hline(y=outcome.noise_lsb, line={"color": "#000", "dash": "dot"}, annotation_text=noise)
     title = f"Error before and after adding {outcome.named}" if outcome.named else "Error of the model and the noise"
     sentence = "The dotted line is the noise that the emulated board was given: no model can go below it."
-    return Section("Does the error fall?", sentence, [style(figure, title, "", "rms error, LSB")])
+    figure = style(figure, title, "", "rms error, LSB (logarithmic)")
+    figure.update_yaxes(type="log", rangemode="tozero")
+    return Section("Does the error fall?", sentence, [figure])
 
 
 def _board(outcome: Outcome) -> Section:

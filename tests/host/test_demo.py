@@ -1,0 +1,36 @@
+"""The whole job: the hidden effect is found on the emulated board, added, and the error falls to the noise."""
+
+import json
+import re
+
+import pytest
+from barberpole.cli import run
+
+KEYS = {
+    "hidden", "named", "rms_before_lsb", "rms_after_lsb", "heldout_before_lsb", "heldout_after_lsb", "noise_lsb",
+    "gain_error_ppm", "selfcal_s",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("hidden", ["cross_field", "bias_temperature"])
+def test_the_hidden_effect_is_named_and_the_error_falls_to_the_noise(hidden, tmp_path, capsys):
+    assert run(["demo", "--hidden", hidden, "-o", str(tmp_path), "--json"]) == 0
+    got = json.loads(capsys.readouterr().out)
+    assert set(got) >= KEYS
+    assert got["named"] == hidden
+    assert got["heldout_after_lsb"] <= 1.10 * got["noise_lsb"]
+    assert got["heldout_after_lsb"] <= got["heldout_before_lsb"] / 3.0
+    assert got["board_error_after_nt"] < got["board_error_before_nt"] / 2.0
+    assert max(abs(ppm) for ppm in got["gain_error_ppm"]) < 200.0
+    assert got["selfcal_s"] <= 2.0
+    assert got["verified"] is True
+    page = (tmp_path / "demo.html").read_text()
+    assert f"{got['heldout_before_lsb']:.1f} to {got['heldout_after_lsb']:.1f} LSB" in page
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", page)  # opens offline
+
+
+def test_with_nothing_hidden_it_says_so(tmp_path, capsys):
+    assert run(["demo", "--hidden", "none", "-o", str(tmp_path), "--json"]) == 0
+    got = json.loads(capsys.readouterr().out)
+    assert (got["named"], got["verdict"]) == (None, "adequate")
+    assert got["heldout_after_lsb"] <= 1.10 * got["noise_lsb"]
