@@ -148,7 +148,7 @@ def test_diagnose_of_several_logs_is_one_object_a_line_and_goes_on_past_a_bad_on
     code, out, _ = call("diagnose", turned, bad, turned, "--model", LINEAR, "--json")
     first, second, third = (json.loads(line) for line in out.splitlines())
     assert code == 2
-    assert list(first)[0] == "log"
+    assert next(iter(first)) == "log"
     assert (first["log"], second["log"]) == (str(turned), str(bad))
     assert set(second) == {"log", "error"}
     assert third["verdict"] == "adequate"

@@ -1,4 +1,4 @@
-"""The built firmware on the emulated board: what it finds at power-up, and what no fault and no pulled plug can take."""
+"""The built firmware on the emulated board: what it finds at power-up, and what no fault or pulled plug can take."""
 
 import random
 import time
