@@ -19,6 +19,7 @@ EARTH_UT = 50.0  # a typical ambient field, on top of which the coils are driven
 CURVATURE = 3  # the lowest odd power a bridge's law can miss
 FIRST_RATIO = 128  # oversampling ratio of code 0; each code doubles it
 MODULATOR_HZ = 4096000  # of the ADS131M08 at 8.192 MHz
+OWN_OFFSET = ("bias.bridge_", "flip_asymmetry.offset_")  # parameters that are the electronic offset
 T0_C = 25.0  # at which the sensor file gives the bridge resistance
 
 
@@ -72,7 +73,7 @@ def factory_response(calibration: Calibration, board: Board, table: CodeTable) -
 
 def factory_offset(calibration: Calibration) -> tuple[float, ...]:
     """Electronic offset in LSB that a model fitted to demodulated readings knows nothing of; 0 where it has its own."""
-    fitted_already = any(name.startswith("bias.bridge_") for name in calibration.parameters)
+    fitted_already = any(name.startswith(OWN_OFFSET) for name in calibration.parameters)
     if calibration.selfcal is None or fitted_already:
         return 0.0, 0.0, 0.0
     return calibration.selfcal.offset_lsb

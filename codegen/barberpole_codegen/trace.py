@@ -179,7 +179,7 @@ class Symbol:
         boxed = [_boxed(v) if isinstance(v, Symbol) else v for v in inputs]
         try:
             return ufunc(*boxed, **kwargs)
-        except TypeError:
+        except (TypeError, AttributeError):
             raise _refused(f"np.{ufunc.__name__}") from None
 
     def _branch(self, *_):
