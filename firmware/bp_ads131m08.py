@@ -21,6 +21,7 @@ _CMD_RESET = const(0x0011)
 _CMD_RREG = const(0xA000)
 _CMD_WREG = const(0x6000)
 _ID = const(0x28)  # high byte of the ID register: eight channels
+_NOBODY = (0x0000, 0xFFFF)  # a data line that nobody drives
 _MODE_CLEAR_RESET = const(0x0110)  # 24-bit words, reset flag cleared, time-out on
 _CLOCK_ALL_ON = const(0xFF02)  # eight channels on, high-resolution power mode; bits 4:2 are the oversampling ratio
 _RESET_PULSE_US = const(400)  # more than 2048 clocks at 8.192 MHz; a shorter low would only synchronise
@@ -42,8 +43,11 @@ class Ads131m08:
         time.sleep_us(_RESET_PULSE_US)
         self._reset.value(1)
         time.sleep_us(_START_US)
-        if self._read_register(_REG_ID) >> 8 != _ID:
-            raise reasons.Fault(reasons.WRONG_CHIP, "no ADS131M08 on the bus")
+        found = self._read_register(_REG_ID)
+        if found in _NOBODY:
+            raise reasons.Fault(reasons.ADC_SILENT, "nothing answers on the converter's bus")
+        if found >> 8 != _ID:
+            raise reasons.Fault(reasons.WRONG_CHIP, "the converter is no ADS131M08")
         self._write_register(_REG_MODE, _MODE_CLEAR_RESET)
         self._write_register(_REG_CLOCK, _CLOCK_ALL_ON | ratio_code << 2)
         self._write_register(_REG_GAIN1, gain1)

@@ -22,7 +22,7 @@ class Dac80504:
 
     def start(self, gain):  # 1 or 2: output range in units of the reference
         if self._read(_REG_ID) >> 8 != _ID:
-            raise reasons.Fault(reasons.WRONG_CHIP, "no DAC80504 on the bus")
+            raise reasons.Fault(reasons.WRONG_CHIP, "the coil driver is no DAC80504")
         self._transfer(_REG_GAIN, _GAIN_2 if gain == 2 else 0)
 
     def write(self, channel, code):

@@ -79,7 +79,8 @@ class Sampler:
     def _sum_axis(self, axis, first):
         raw = self._raw
         total, low, high = 0, adc131.CLIP, -adc131.CLIP
-        for i in range(self._words[axis], len(raw), adc131.FRAME_BYTES):
+        i, end, step = self._words[axis], len(raw), adc131.FRAME_BYTES
+        while i < end:  # a range with a step from elsewhere would be an object on the heap
             word = raw[i] << 16 | raw[i + 1] << 8 | raw[i + 2]
             if word & 0x800000:
                 word -= 0x1000000
@@ -88,6 +89,7 @@ class Sampler:
                 low = word
             if word > high:
                 high = word
+            i += step
         self.sums[first + axis] += total
         if low <= -adc131.CLIP or high >= adc131.CLIP:
             self.clipped |= 1 << axis
