@@ -24,7 +24,7 @@ SETTINGS = {
     "sensitivity_temperature": ({"order": 3},),
     "drift": ({"order": 2},),
     "coil_heating": ({"tau_s": 0.3, "share": 0.5},),
-    "adc_inl": ({"harmonics": 3, "bow": True}, {"harmonics": 0}),
+    "adc_inl": ({"form": "ripple", "harmonics": 3}, {"form": "ripple", "period_lsb": 16.0}),
     "mains": ({"frequency_hz": 7.3},),
 }
 N = 40
@@ -184,7 +184,7 @@ def test_what_cannot_be_compiled_says_why():
         ("drift", {"order": 0}),
         ("drift", {"order": 1.5}),
         ("hysteresis", {"plays": 99}),
-        ("adc_inl", {"harmonics": -1}),
+        ("adc_inl", {"form": "wavy"}),
         ("cross_field", {"form": "flopped"}),
     ],
 )

@@ -1,11 +1,13 @@
 """ADC integral nonlinearity: the converter's code is off by an amount that depends on the code alone.
 
-    y = c + sum_h (s_h sin(2 pi h c / P) + c_h cos(2 pi h c / P)) + q c^2            (1)
+    y = c + k |c| + q c^2 + r c^3                                        form "smooth"   (1)
+    y = c + sum_h (s_h sin(2 pi h c / P) + u_h cos(2 pi h c / P))        form "ripple"   (2)
 
-Wrong weights of the lower bits repeat every P codes, P a power of two; setting `harmonics = h` follows their corners
-more closely. q is the bow of the transfer curve, setting `bow = true`; flipping turns it over, so that it is there by
-itself in logs of raw SET and RESET readings. c is the raw code: where RESET readings were brought to the sign of SET,
-(1) acts on s c and the result is turned back. P is searched for in the residual (setting `period_lsb`).
+(1) bends the transfer curve: a kink at mid scale, a bow, a curve. (2) is a lower bit of the wrong weight, which
+repeats every P codes, P a power of two (settings `period_lsb`, `harmonics`). c is the raw code: where RESET readings
+were brought to the sign of SET, the law acts on s c and the result is turned back, so that kink and bow alternate. In
+demodulated readings they cancel but for what the offset makes of them, and the rest of (1) looks like `quadratic` and
+`cubic` unless the code sits far from the field's zero.
 """
 
 import numpy as np
@@ -15,24 +17,57 @@ from barberpole.effects.effect import Array, Conditions, Effect, Param, Setup, S
 from barberpole.errors import InputError, must
 
 MAX_HARMONICS = 5
-FINEST_LSB = 1.0  # a period has at least two codes
+PERIOD_LSB = 64.0
+EXACT = 1e-4  # how far a fit may move the period: a power of two is one
 NEWTON_STEPS = 30
 DONE = 1e-13
 
 
 def params(setup: Setup):
-    """Sines and cosines in LSB, the bow in 1/LSB, the period in LSB."""
-    harmonics = setup.settings.get("harmonics", 1)
-    if not isinstance(harmonics, int) or not 0 <= harmonics <= MAX_HARMONICS:
-        raise InputError(must("setting harmonics", f"a whole number from 0 to {MAX_HARMONICS}", repr(harmonics)))
-    span, period = setup.span_ut * setup.lsb_per_ut, float(setup.settings.get("period_lsb", 64.0))
+    """Smooth: k, q in 1/LSB, r in 1/LSB². Ripple: amplitudes in LSB and the period in LSB."""
+    if setup.named("form", "smooth", "ripple") == "ripple":
+        return _ripple(setup)
+    span, part = setup.span_ut * setup.lsb_per_ut, 0.005
+    kinds = (("kink_", "1", 1.0), ("bow_", "1/LSB", span), ("curve_", "1/LSB^2", span * span))
+    sized = [(p, unit, {"typical": part / s, "lower": -0.1 / s, "upper": 0.1 / s}) for p, unit, s in kinds]
+    return tuple(param for prefix, unit, size in sized for param in per_axis(unit, prefix=prefix, **size))
+
+
+def _ripple(setup: Setup):
+    harmonics, period = setup.settings.get("harmonics", 1), float(setup.settings.get("period_lsb", PERIOD_LSB))
+    if not isinstance(harmonics, int) or not 1 <= harmonics <= MAX_HARMONICS:
+        raise InputError(must("setting harmonics", f"a whole number from 1 to {MAX_HARMONICS}", repr(harmonics)))
     found = []
     for h in range(1, harmonics + 1):
         size = {"typical": 0.01 * period / h, "lower": -0.1 * period / h, "upper": 0.1 * period / h}
         found += [*per_axis("LSB", prefix=f"sin{h}_", **size), *per_axis("LSB", prefix=f"cos{h}_", **size)]
-    if setup.settings.get("bow", setup.flipping == "raw") or not harmonics:
-        found += per_axis("1/LSB", prefix="bow_", typical=0.005 / span, lower=-0.2 / span, upper=0.2 / span)
-    return *found, Param("period", "LSB", period, 0.9 * period, 1.1 * period, None, period, inner=True)
+    low, high = period * (1.0 - EXACT), period * (1.0 + EXACT)
+    return *found, Param("period", "LSB", period, low, high, None, period, inner=True)
+
+
+def _terms(codes, p):
+    """Pairs of what a parameter multiplies and its slope by the code, (3, n) each, in steps of three parameters."""
+    if len(p) == 9:
+        return [(codes * _sign(codes), _sign(codes)), (codes**2, 2.0 * codes), (codes**3, 3.0 * codes**2)]
+    found = []
+    for h in range(1, (len(p) - 1) // 6 + 1):
+        turn = 2.0 * np.pi * h / p[-1]
+        sine, cosine = np.sin(turn * codes), np.cos(turn * codes)
+        found += [(sine, turn * cosine), (cosine, -turn * sine)]
+    return found
+
+
+def _sign(codes):
+    return np.where(np.real(codes) < 0.0, -1.0, 1.0)
+
+
+def _error(codes, p):
+    """What the law adds to the codes (3, n), and its slope by the code."""
+    groups = [np.asarray(p[j : j + 3])[:, None] for j in range(0, len(p) - len(p) % 3, 3)]
+    error, slope = np.zeros(codes.shape), np.zeros(codes.shape)
+    for group, (value, steepness) in zip(groups, _terms(codes, p), strict=True):
+        error, slope = error + group * value, slope + group * steepness
+    return error, slope
 
 
 def _codes(xyz, at: Conditions):
@@ -41,29 +76,14 @@ def _codes(xyz, at: Conditions):
     return sign * np.asarray(xyz), sign
 
 
-def _error(codes, p):
-    """What (1) adds to the codes (3, n), and its slope by the code."""
-    error, slope = 0.0 * (codes * p[-1]), 0.0 * (codes * p[-1])
-    for h in range((len(p) - 1) // 6):
-        sin, cos = np.asarray(p[6 * h : 6 * h + 3])[:, None], np.asarray(p[6 * h + 3 : 6 * h + 6])[:, None]
-        turn = 2.0 * np.pi * (h + 1) / p[-1]
-        sine, cosine = np.sin(turn * codes), np.cos(turn * codes)
-        error = error + sin * sine + cos * cosine
-        slope = slope + turn * (sin * cosine - cos * sine)
-    if (len(p) - 1) % 6:
-        bow = np.asarray(p[-4:-1])[:, None]
-        error, slope = error + bow * codes * codes, slope + 2.0 * bow * codes
-    return error, slope
-
-
 def forward(xyz, p, at: Conditions):
-    """Eq. (1), LSB."""
+    """Eq. (1) or (2), LSB."""
     codes, sign = _codes(xyz, at)
     return tuple(np.asarray(xyz) + sign * _error(codes, p)[0])
 
 
 def undo(xyz, p, at: Conditions):
-    """Inverse of (1), by Newton's method."""
+    """Inverse by Newton's method."""
     wanted, sign = _codes(xyz, at)
     codes = wanted
     for _ in range(NEWTON_STEPS):
@@ -76,44 +96,40 @@ def undo(xyz, p, at: Conditions):
 
 
 def jacobian(xyz, p, at: Conditions):
-    """Slopes of (1)."""
+    """Slopes of (1) or (2)."""
     codes, sign = _codes(xyz, at)
+    slope = _error(codes, p)[1]
+    by_group = np.concatenate([value for value, _ in _terms(codes, p)])
+    if len(p) == 9:
+        return 1.0 + slope, sign * by_group
     d_p = np.zeros((3, len(p), codes.shape[1]))
-    by_period = np.zeros(codes.shape)
-    for h in range((len(p) - 1) // 6):
-        turn = 2.0 * np.pi * (h + 1) / p[-1]
-        sine, cosine = np.sin(turn * codes), np.cos(turn * codes)
-        for axis in range(3):
-            d_p[axis, 6 * h + axis], d_p[axis, 6 * h + 3 + axis] = sine[axis], cosine[axis]
-            slope = p[6 * h + axis] * cosine[axis] - p[6 * h + 3 + axis] * sine[axis]
-            by_period[axis] -= turn / p[-1] * codes[axis] * slope
-    if (len(p) - 1) % 6:
-        for axis in range(3):
-            d_p[axis, -4 + axis] = codes[axis] ** 2
-    d_p[:, -1] = by_period
-    return 1.0 + _error(codes, p)[1], sign * d_p
+    for axis in range(3):
+        d_p[axis, axis:-1:3] = by_group[axis::3]
+        d_p[axis, -1] = -slope[axis] * codes[axis] / p[-1]
+    return 1.0 + slope, sign * d_p
 
 
 def shapes(setup: Setup):
-    """The bow, and the ripple where the model file says its period."""
-    bow = Shape(settings={"bow": True, "harmonics": 0})
-    return (Shape(), bow) if "period_lsb" in setup.settings else (bow,)
+    """Kink, bow and curve each for itself, and together."""
+    smooth = {"form": "smooth"}
+    single = [Shape(tuple(kind + axis for axis in "xyz"), settings=smooth) for kind in ("kink_", "bow_", "curve_")]
+    return *single, Shape(settings=smooth)
 
 
 def search(setup: Setup, at: Conditions, reading: Array, residual: Array):
-    """The period at which the residual (3, n) repeats over the reading: plain, and with corners."""
+    """The power of two at which the residual (3, n) repeats over the codes best: plain, and with corners."""
     codes, sign = _codes(reading, at)
-    f, tried = scan.line(codes, sign * residual, FINEST_LSB)
+    period, tried = scan.power_of_two(codes, sign * residual)
     if not tried:
         return ()
-    found = {"period_lsb": 1.0 / f}
-    inner = {"period": 1.0 / f}
-    return tuple(Shape(inner=inner, settings=found | {"harmonics": h}, tried=tried) for h in (1, 3))
+    ripple = {"form": "ripple", "period_lsb": period}
+    inner = {"period": period}
+    return tuple(Shape(inner=inner, settings=ripple | {"harmonics": h}, tried=tried) for h in (1, 3))
 
 
 ADC_INL = Effect(
     "adc_inl",
-    "y = c + sum (s_h sin(2 pi h c / P) + c_h cos(2 pi h c / P)) + q c^2",
+    "y = c + k |c| + q c^2 + r c^3, or c + sum (s_h sin(2 pi h c / P) + u_h cos(2 pi h c / P))",
     "IEEE Std 1241; thesis 6.2.2.1 (nonlinearity of the converters)",
     params,
     forward,
@@ -121,7 +137,7 @@ ADC_INL = Effect(
     jacobian,
     summary="the converter's codes are unevenly spaced",
     stage="reading",
-    off_board="its undo needs sines",
+    off_board="it acts on single codes, of which the board undoes the mean",
     shapes=shapes,
     search=search,
 )

@@ -4,9 +4,10 @@
     y_i = x_i (1 + g_i w_i) + b_i w_i                                                (2)
 
 The heat of a coil of resistance R is R I^2; its own die takes it first, and a share a reaches the neighbours. The die
-follows with the thermal time constant tau (0: at once). Offset and sensitivity then follow temperature as in
-`bias_temperature` and `sensitivity_temperature`, though the sensor's thermometer may not have noticed. An offset coil
-of 50 ohm (thesis 6.2.1) at 10 mA makes 5 mW. R and the temperature coefficients are all in b and g.
+follows with the thermal time constant tau (0: at once) and is cold before the first sample. Offset and sensitivity then
+follow temperature as in `bias_temperature` and `sensitivity_temperature`, though the sensor's thermometer may not have
+noticed. An offset coil of 50 ohm (thesis 6.2.1) at 10 mA makes 5 mW. R and the temperature coefficients are all in b
+and g.
 """
 
 import numpy as np
@@ -31,7 +32,7 @@ def params(setup: Setup):
 def _heats(p, at: Conditions):
     """Q (3, n) of (1)."""
     square = np.asarray(at.i_ma, float) ** 2 + 0.0 * p[7]
-    return series.filtered(square, (p[7],) * 3, at, series.low_pass) if p[7] else square
+    return series.filtered(square, (p[7],) * 3, at, series.warm_up) if p[7] else square
 
 
 def _warmth(heats, share):
@@ -60,7 +61,7 @@ def jacobian(xyz, p, at: Conditions):
     x, p = np.asarray(xyz), np.asarray(p, float)
     heats = _heats(p, at)
     warmth, response = _warmth(heats, p[6]), p[3:6, None] * x + p[:3, None]
-    by_tau = series.filtered(heats, (p[7],) * 3, at, series.low_pass_by_tau)
+    by_tau = series.filtered(heats, (p[7],) * 3, at, series.warm_up_by_tau)
     d_p = np.zeros((3, 8, x.shape[1]))
     for axis in range(3):
         d_p[axis, axis] = warmth[axis]

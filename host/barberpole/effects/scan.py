@@ -1,4 +1,4 @@
-"""Where a residual is periodic: in time (mains) or in the reading itself (converter).
+"""Where a residual is periodic: in time, or over a converter's codes.
 
 The residual is averaged over bins of the variable and Fourier transformed; a line counts by its height over the
 smoothed spectrum around it, so that slow structure and 1/f noise do not pass for a line.
@@ -10,6 +10,7 @@ from barberpole.effects.effect import Array
 
 MAX_BINS = 1 << 17
 SMOOTH = 31  # spectral bins of the background
+POWERS = 12  # up to 8192 codes
 SLOWEST = 4  # periods over the range: anything slower is drift or curvature
 
 
@@ -35,6 +36,18 @@ def line(variable: Array, residual: Array, step: float) -> tuple[float, int]:
     return _refine(variable, residual, start, 0.5 / (bins * width)), min(bins, residual.shape[1])
 
 
+def power_of_two(codes: Array, residual: Array) -> tuple[float, int]:
+    """The power of two, in the unit of `codes` (m, n), at which residual (m, n) repeats best, and how many were tried.
+
+    Of at least four, so that a code and the next differ, and of three periods over the range.
+    """
+    most = float(np.ptp(codes)) / 3.0
+    periods = [4.0 * 2.0**k for k in range(POWERS) if 4.0 * 2.0**k <= most]
+    if not periods:
+        return 0.0, 0
+    return max(periods, key=lambda period: power(codes, residual, 1.0 / period)), len(periods)
+
+
 def _background(power: Array) -> Array:
     edge = np.pad(power, SMOOTH // 2, mode="reflect")
     total = np.convolve(edge, np.ones(SMOOTH) / SMOOTH, mode="valid")
@@ -46,13 +59,14 @@ def _refine(variable: Array, residual: Array, start: float, reach: float) -> flo
     centre, half = start, reach
     for _ in range(6):
         around = centre + half * np.array([-1.0, 0.0, 1.0])
-        a, b, c = (_power(variable, residual, f) for f in around)
+        a, b, c = (power(variable, residual, f) for f in around)
         bend = a - 2.0 * b + c
         centre += half * np.clip(0.5 * (a - c) / bend, -1.0, 1.0) if bend < 0 else half * np.sign(c - a)
         half *= 0.4
     return float(centre)
 
 
-def _power(variable: Array, residual: Array, frequency: float) -> float:
+def power(variable: Array, residual: Array, frequency: float) -> float:
+    """Periodogram of residual (m, n) over variable (n,) or (m, n) at one frequency, summed over the rows."""
     wave = np.exp(2j * np.pi * frequency * variable)
     return float(np.sum(np.abs(np.sum(residual * wave, axis=-1)) ** 2))

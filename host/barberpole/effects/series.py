@@ -52,6 +52,12 @@ def low_pass(x: Array, dt: Array, tau_s) -> Array:
     return recur(keep, v)
 
 
+def warm_up(x: Array, dt: Array, tau_s) -> Array:
+    """The same, beginning from nothing before the first sample."""
+    keep = memory(dt, tau_s)
+    return recur(keep, (1.0 - keep) * x)
+
+
 def memory(dt: Array, tau_s) -> Array:
     """How much of the last output survives a step: tau / (tau + dt)."""
     return tau_s / (tau_s + dt)
@@ -62,6 +68,11 @@ def low_pass_by_tau(y: Array, dt: Array, tau_s: float) -> Array:
     v = np.zeros(np.shape(y))
     v[..., 1:] = -np.diff(y) / (tau_s + dt[1:])
     return recur(memory(dt, tau_s), v)
+
+
+def warm_up_by_tau(y: Array, dt: Array, tau_s: float) -> Array:
+    """d y / d tau of `warm_up`, from its output y (..., n)."""
+    return recur(memory(dt, tau_s), -np.diff(y, prepend=0.0) / (tau_s + dt))
 
 
 def high_pass(y: Array, dt: Array, tau_s) -> Array:
