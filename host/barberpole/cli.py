@@ -5,7 +5,7 @@ import sys
 import typer
 
 from barberpole import __version__
-from barberpole.commands import board, calibrate, demo
+from barberpole.commands import board, calibrate, catalogue, demo, trajectory
 from barberpole.errors import BarberpoleError
 
 BAD_INPUT = 2
@@ -18,7 +18,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 calibrate.register(app)
+catalogue.register(app)
 board.register(app)
+trajectory.register(app)
 demo.register(app)
 
 

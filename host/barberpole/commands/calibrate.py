@@ -1,4 +1,4 @@
-"""fit, compare, diagnose, add, remove, verify, convert, effects: what is done with a log and a model."""
+"""fit, compare, diagnose, add, remove, verify, convert: what is done with a log and a model."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ from barberpole.commands import show
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
 from barberpole.diagnose import compare as compare_fit
 from barberpole.diagnose import diagnose as diagnose_log
-from barberpole.effects import STACK, Effect
+from barberpole.effects import Effect
 from barberpole.errors import BarberpoleError, InputError, must
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.log import Log, read_log, write_log
@@ -33,7 +33,7 @@ SensorOption = Annotated[str | None, typer.Option("--sensor", help="Sensor name 
 
 def register(app: typer.Typer) -> None:
     """Add these commands to the roof."""
-    for command in (fit, compare, diagnose, add, remove, verify, convert, effects):
+    for command in (fit, compare, diagnose, add, remove, verify, convert):
         app.command()(command)
 
 
@@ -198,11 +198,3 @@ def convert(log: LogPath, output: Annotated[Path, typer.Option("-o", "--output",
     write_log(data, output)
     notes(data.notes)
     OUT.print(f"{data.n} rows written to {output}")
-
-
-def effects(as_json: bool = AS_JSON) -> None:
-    """The catalogue of physical effects, in physical order."""
-    if as_json:
-        print_json({"effects": [{"name": e.name, "equation": e.equation, "source": e.source} for e in STACK]})
-    else:
-        show.catalogue(STACK)
