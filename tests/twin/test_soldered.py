@@ -2,7 +2,7 @@
 
 import pytest
 from barberpole.twin import World
-from barberpole.twin.pins import PINS
+from barberpole.twin.pins import PINS, bus_number
 from barberpole.twin.soldered import Soldered
 
 
@@ -25,7 +25,7 @@ def state(soldered):
 
 def send(soldered, name, bus, t_us, data):
     soldered.pin(t_us, PINS.index(name), 0)
-    answer = soldered.transfer(t_us, bus, data)
+    answer = soldered.transfer(t_us, bus_number(bus), data)
     soldered.pin(t_us, PINS.index(name), 1)
     return answer
 
@@ -80,7 +80,15 @@ def test_coil_current_follows_the_code(make, board):
 
 
 def test_nothing_answers_without_chip_select(make, board):
-    assert make().transfer(0, board.adc.spi, bytes(4)) == b"\xff" * 4
+    assert make().transfer(0, bus_number(board.adc.spi), bytes(4)) == b"\xff" * 4
+
+
+def test_nothing_answers_in_another_spi_mode(make, board):
+    soldered = make()
+    soldered.pin(0, PINS.index(board.adc.cs_pin), 0)
+    for mode in (0, 2, 3):
+        assert soldered.transfer(0, bus_number(board.adc.spi, mode), bytes(4)) == b"\xff" * 4
+    assert soldered.transfer(0, bus_number(board.adc.spi, 1), bytes(4)) != b"\xff" * 4
 
 
 def test_a_new_current_charges_the_arithmetic_of_a_point_once(make, board):

@@ -147,7 +147,7 @@ class Twin:
 
     @property
     def log_text(self) -> str:
-        """All that the board has said since it was made (the last megabyte)."""
+        """All that the board has said since it was made (the last eight megabytes)."""
         return self._ask("log")
 
     def _ask(self, command: str, argument: object = None):

@@ -16,7 +16,7 @@ from barberpole.errors import InputError, must
 
 SHIMS = Path(__file__).with_name("shims")
 BOOT = SHIMS / "boot.py"
-SHIM_HEAP = 64 * 1024  # what the emulated modules take of the heap
+SHIM_HEAP = 32 * 1024  # what the emulated modules take of the heap
 STOP_WAIT_S = 0.5
 
 

@@ -7,3 +7,8 @@ PINS = (
 )
 SPI_CLOCK_HZ = {1: 84_000_000, 2: 42_000_000}
 """Clock before the prescaler of each SPI: APB2 and APB1 of the STM32F405."""
+
+
+def bus_number(spi: int, mode: int = 1) -> int:
+    """How a bus in an SPI mode is numbered between interpreter and emulator; both converters speak mode 1 only."""
+    return spi | mode << 4

@@ -19,7 +19,7 @@ from barberpole.twin.running import HARD, POWER_ON, SOFT, Ending, Job, Running, 
 from barberpole.twin.soldered import Soldered
 from barberpole.twin.world import World
 
-LOG_BYTES = 1 << 20
+LOG_BYTES = 8 << 20
 LOOK_S = 0.02  # how often it is checked whether somebody opened the port
 MAX_CRASHES = 3
 

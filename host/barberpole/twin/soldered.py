@@ -13,7 +13,7 @@ from barberpole.twin.ads131m08 import Ads131m08
 from barberpole.twin.analog import AnalogInputs, noise_level
 from barberpole.twin.dac80504 import Dac80504
 from barberpole.twin.noise import Noise
-from barberpole.twin.pins import PINS
+from barberpole.twin.pins import PINS, bus_number
 from barberpole.twin.sensor_head import AXES, SensorHead
 from barberpole.twin.world import World
 
@@ -41,7 +41,7 @@ class Soldered:
         self._charge_us = 0
         self.incidents: list[str] = []
         self._dac = Dac80504(board.dac.vref_v, board.dac.gain == 2, self._on_coil)
-        self._buses = {board.adc.spi: [], board.dac.spi: []}
+        self._buses = {bus_number(board.adc.spi): [], bus_number(board.dac.spi): []}
         self._wire()
 
     def _wire(self) -> None:
@@ -55,7 +55,7 @@ class Soldered:
         for chip, table in ((self._adc, board.adc), (self._dac, board.dac)):
             pin = PINS.index(table.cs_pin)
             self._selected[pin] = False
-            self._buses[table.spi].append((pin, chip))
+            self._buses[bus_number(table.spi)].append((pin, chip))
             self._on_pin[pin] = partial(self._select, pin, chip)
 
     def pin(self, t_us: int, pin: int, level: int) -> None:
@@ -72,7 +72,7 @@ class Soldered:
             self.pin(t_us, PINS.index(name), 1)
 
     def transfer(self, t_us: int, bus: int, data: bytes) -> bytes:
-        """Bytes over an SPI bus, to the chip that is selected there."""
+        """Bytes over an SPI bus (`bus_number`), to the chip that is selected there and speaks its mode."""
         for pin, chip in self._buses.get(bus, ()):
             if self._selected[pin]:
                 answer = chip.exchange(t_us, data)

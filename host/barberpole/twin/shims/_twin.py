@@ -2,7 +2,7 @@
 # Time is counted here and never taken from the PC. What the program does to pins is kept with its time and sent along
 # with the next request; a request is answered with the time after it and with the moment of the next conversion.
 # Words of 64 bits, both ways:
-#   request: op | bus << 8 | pin changes << 16 | bytes sent << 28 | bytes wanted << 44;  time in µs;
+#   request: op | (bus | SPI mode << 4) << 8 | pin changes << 16 | bytes sent << 28 | bytes wanted << 44;  time in µs;
 #            each pin change as time << 16 | pin << 8 | level;  the bytes sent
 #   answer:  time in µs (its complement: Ctrl-C was pressed);  time of data-ready in µs;  the bytes wanted
 import json

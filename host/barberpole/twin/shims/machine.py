@@ -69,7 +69,7 @@ class SPI:
     def __init__(self, id, baudrate=1000000, **options):
         if str(id) not in _twin.setup["spi_clock_hz"]:
             raise ValueError("SPI(%s) doesn't exist" % id)
-        self._bus = id
+        self._id = id
         self._clock_hz = _twin.setup["spi_clock_hz"][str(id)]
         self.init(baudrate, **options)
 
@@ -78,6 +78,7 @@ class SPI:
         while self._clock_hz // divider > baudrate and divider < 256:
             divider *= 2
         self._baud = self._clock_hz // divider
+        self._bus = self._id | (polarity << 1 | phase) << 4
 
     def deinit(self):
         pass
@@ -100,7 +101,7 @@ class SPI:
         _twin.transfer(self._bus, self._baud, out, into, len(out))
 
     def __repr__(self):
-        return "SPI(%d, baudrate=%d)" % (self._bus, self._baud)
+        return "SPI(%d, baudrate=%d)" % (self._id, self._baud)
 
 
 class Signal:

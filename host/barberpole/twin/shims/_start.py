@@ -1,0 +1,63 @@
+# _start.py: what happens between power and prompt on the emulated board: its modules, its flash, the user's files.
+import gc
+import sys
+
+import _twin
+import os
+import vfs
+from _flash import Flash
+
+
+def begin(names):  # runs boot.py and main.py in `names`, as a board does in those of the prompt
+    provide_modules()
+    mount_flash()
+    gc.collect()
+    try:
+        _twin.exchange(_twin.STARTED)
+        run("boot.py", names)
+        if not _twin.setup["raw"]:  # a board in the raw prompt leaves main.py out after a soft reset
+            run("main.py", names)
+    except KeyboardInterrupt:  # pressed before there was anything to interrupt
+        pass
+
+
+def ready():
+    _twin.exchange(_twin.READY)
+
+
+def provide_modules():
+    for name in ("machine", "os", "time", "pyb", "stm"):  # later imports find these, whatever the path is then
+        __import__(name)
+        sys.modules["u" + name] = sys.modules[name]
+
+
+def mount_flash():
+    flash = Flash(_twin.setup["image"], charge_write)
+    vfs.umount("/")
+    try:
+        disk = vfs.VfsLfs2(flash)
+    except OSError:
+        vfs.VfsLfs2.mkfs(flash)
+        disk = vfs.VfsLfs2(flash)
+    vfs.mount(disk, "/")
+    os.chdir("/")
+    sys.path[:] = ["", ".frozen", "/lib"]
+
+
+def charge_write():
+    _twin.now += _twin.FLASH_US
+    _twin.exchange(_twin.FLASH)
+
+
+def run(path, names):
+    try:
+        with open(path) as file:
+            source = file.read()
+    except OSError:
+        return
+    try:
+        exec(compile(source, path, "exec"), names)
+    except SystemExit:
+        raise
+    except BaseException as error:
+        sys.print_exception(error)
