@@ -86,14 +86,13 @@ def power_up(hardware, writer, clock):  # False where no samples can be had
         result = _self_calibrate(hardware, writer, clock)
         codes, detail = result.reasons, result.detail
         if result.solution is not None and not codes:
-            held = _save(store, result.solution, result.temp_c())
+            held = _save(store, held, result, notes)
     hardware.compensator.put_in_force(held)
     if not calibration.HAS_FACTORY_REFERENCE:
         codes = codes + [reasons.NO_FACTORY_REFERENCE]
     verdict = report.verdict(codes, held, result)
-    events = notes + codes
-    bp_store.replace(RUN_FILE, lambda file: report.write_run(file, head, begin_s, result, verdict, events))
-    for code in events:
+    _keep(notes, lambda file: report.write_run(file, head, begin_s, result, verdict, notes + codes))
+    for code in notes + codes:
         report.event(writer, begin_s, code, detail)
     writer.json(records.RESULT, verdict)
     return can_sample
@@ -144,16 +143,36 @@ def _self_calibrate(hardware, writer, clock):
         raise
 
 
-def _save(store, solution, temp_c):  # gains of 1 where there is nothing to compare today's with
+def _save(store, held, result, notes):  # what is in force then; gains of 1 where nothing can be compared with today's
+    solution = result.solution
     gain = solution.gain if calibration.HAS_FACTORY_REFERENCE else (1.0, 1.0, 1.0)
     shift_ut = calibration.in_frame(*solution.ambient_ut) if board.SHIELDED else (0.0, 0.0, 0.0)
-    return store.save(gain, shift_ut, solution.offset_lsb, temp_c)
+    try:
+        return store.save(gain, shift_ut, solution.offset_lsb, result.temp_c())
+    except OSError:  # the flash is full or worn
+        notes.append(reasons.STORE_FAILED)
+        return held
+
+
+def _keep(notes, produce):
+    try:
+        bp_store.replace(RUN_FILE, produce)
+    except OSError:
+        notes.append(reasons.STORE_FAILED)
 
 
 def _notes(store):  # codes of what is worth knowing and forbids nothing
     found = []
     if store.corrupt:
         found.append(reasons.STORE_CORRUPT)
-    if any(name.startswith("bp_") for name in os.listdir()):
+    if any(name.startswith("bp_") for name in os.listdir()) or _text_beside_compiled("lib"):
         found.append(reasons.SHADOWED)
     return found
+
+
+def _text_beside_compiled(folder):  # MicroPython takes the text
+    try:
+        names = os.listdir(folder)
+    except OSError:  # no such folder: the firmware is frozen or in ROMFS
+        return False
+    return any(name.startswith("bp_") and name.endswith(".mpy") and name[:-4] + ".py" in names for name in names)

@@ -18,6 +18,7 @@ MODEL_MISMATCH = const(12)
 INTERRUPTED = const(13)
 SHADOWED = const(14)
 OUT_OF_RANGE = const(15)
+STORE_FAILED = const(16)
 
 # name and sentence by code
 TABLE = (
@@ -35,8 +36,9 @@ TABLE = (
     ("supply_low", "The supply of the flip pulses is too low to switch the bridges fully."),
     ("model_mismatch", "Board constants, trajectory and calibration on this board were not built together."),
     ("interrupted", "The run was interrupted before its verdict."),
-    ("shadowed", "A file in the root folder hides a module of the same name in the firmware."),
+    ("shadowed", "A stray file hides a module of the same name in the firmware."),
     ("out_of_range", "A reading lies outside the range in which the model can be undone."),
+    ("store_failed", "The flash did not take a file: what was in force stays in force."),
 )
 
 

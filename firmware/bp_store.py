@@ -53,7 +53,7 @@ class Store:
         with open(self._path(slot), "wb") as file:
             file.write(body + struct.pack("<I", binascii.crc32(body)))
         sync()
-        return Stored(NAMES[slot], held.seq + 1, tuple(gain), tuple(shift_ut), tuple(offset_lsb), temp_c)
+        return self.load()  # read back: what cannot be read is not in force
 
     def _path(self, slot):
         return self._folder + "/" + _FILES[slot]
@@ -76,15 +76,17 @@ class Store:
 
 
 def next_boot(folder):  # counts power-ups; begins again at 1 where the count is lost
-    count = 0
     try:
         with open(folder + "/boot", "rb") as file:
             count = struct.unpack("<I", file.read())[0]
     except (OSError, ValueError):
         count = 0
     make_folder(folder)
-    with open(folder + "/boot", "wb") as file:
-        file.write(struct.pack("<I", count + 1))
+    try:
+        with open(folder + "/boot", "wb") as file:
+            file.write(struct.pack("<I", count + 1))
+    except OSError:
+        pass  # no room: the same number comes again
     return count + 1
 
 
@@ -99,8 +101,8 @@ def replace(path, produce):  # a whole new file or the old one: produce(file) wr
 def make_folder(path):
     try:
         os.mkdir(path)
-    except OSError:  # it is there already; if it cannot be made, opening a file in it says so
-        return
+    except OSError:
+        pass  # it is there already; if it cannot be made, opening a file in it says so
 
 
 def sync():  # the cache of the flash otherwise waits for seconds
