@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -164,6 +165,15 @@ def test_nothing_survives_a_killed_process(tmp_path, victim):
         time.sleep(0.02)
     owner.kill()
     owner.wait()
+
+
+def test_what_the_pyboard_does_not_have_is_refused(board, tmp_path):
+    with pytest.raises(InputError, match="a pin of the emulated board must be one of the pyboard's; got PA99"):
+        Twin(replace(board, flip=replace(board.flip, set_pin="PA99")), tmp_path)
+    with pytest.raises(InputError, match=r"SPI bus .* must be 1 or 2; got 3"):
+        Twin(replace(board, adc=replace(board.adc, spi=3)), tmp_path)
+    with pytest.raises(InputError, match="the seed must be 0 or more; got -1"):
+        Twin(board, tmp_path, seed=-1)
 
 
 def test_every_fault_has_a_name_and_others_are_refused(board, tmp_path):

@@ -23,6 +23,7 @@ from barberpole.errors import InputError, PortError, must
 from barberpole.twin.faults import check_faults
 from barberpole.twin.flash import make_image
 from barberpole.twin.interpreter import find_micropython
+from barberpole.twin.pins import check_pins
 from barberpole.twin.process import Power
 from barberpole.twin.running import Job
 from barberpole.twin.world import World
@@ -46,10 +47,11 @@ class Twin:
     ):
         """`seed` sets noise and magnetisation at power-up; `files` maps paths on the board to files to put there.
 
-        Raises InputError for an unknown fault, a missing interpreter or files that do not fit.
+        Raises InputError for an unknown fault or pin, a missing interpreter or files that do not fit.
         """
         self.world = World.of(board) if world is None else world
-        self._board, self._seed, self._faults = board, seed, check_faults(faults)
+        check_pins(board)
+        self._board, self._seed, self._faults = board, check_seed(seed), check_faults(faults)
         self._image = (Path(flash_dir) / f"{board.name}.lfs2").resolve()
         self._files = files or {}
         self._process: subprocess.Popen | None = None
@@ -104,7 +106,7 @@ class Twin:
         cut_s: board time in s at which the power goes away again, until the next call.
         """
         self.world = self.world if world is None else world
-        self._seed = self._seed if seed is None else seed
+        self._seed = self._seed if seed is None else check_seed(seed)
         self._faults = self._faults if faults is None else check_faults(faults)
         self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s))
 
@@ -160,3 +162,10 @@ class Twin:
         except (EOFError, OSError):
             pass
         raise PortError(must("the emulated board", "alive", "no answer", self.port))
+
+
+def check_seed(seed: int) -> int:
+    """The seed. Raises InputError where it is negative."""
+    if seed < 0:
+        raise InputError(must("the seed", "0 or more", seed))
+    return seed

@@ -1,5 +1,8 @@
 """Names of the pyboard's pins, in the order that numbers them between interpreter and emulator."""
 
+from barberpole.board import Board
+from barberpole.errors import InputError, must
+
 PINS = (
     *(f"X{i}" for i in (*range(1, 13), *range(17, 23))),
     *(f"Y{i}" for i in range(1, 13)),
@@ -7,6 +10,17 @@ PINS = (
 )
 SPI_CLOCK_HZ = {1: 84_000_000, 2: 42_000_000}
 """Clock before the prescaler of each SPI: APB2 and APB1 of the STM32F405."""
+
+
+def check_pins(board: Board) -> None:
+    """Raises InputError where the board file uses a pin or a bus that the pyboard does not have."""
+    flip, adc, dac = board.flip, board.adc, board.dac
+    for pin in (flip.set_pin, flip.reset_pin, adc.cs_pin, adc.drdy_pin, adc.reset_pin, dac.cs_pin):
+        if pin not in PINS:
+            raise InputError(must("a pin of the emulated board", "one of the pyboard's", pin, board.name))
+    for spi in (adc.spi, dac.spi):
+        if spi not in SPI_CLOCK_HZ:
+            raise InputError(must("an SPI bus of the emulated board", "1 or 2", spi, board.name))
 
 
 def bus_number(spi: int, mode: int = 1) -> int:

@@ -20,6 +20,7 @@ from barberpole.twin.world import World
 SET, RESET = 1, -1
 STEP_DELAY_S = 0.2  # ambient_step: after the coils were first driven
 KEPT_INCIDENTS = 100
+MAGNETISATION = 1 << 40  # its random numbers are none of the noise's, which count blocks from 0
 FLOATING = 0xFF  # what a bus reads where nothing answers
 
 
@@ -28,7 +29,7 @@ class Soldered:
 
     def __init__(self, board: Board, world: World, seed: int, power_up: int, faults: frozenset[str]):
         self.board, self.faults = board, faults
-        magnetisation = np.random.default_rng((seed, power_up, 0)).choice((SET, RESET), 3).tolist()
+        magnetisation = np.random.default_rng((seed, power_up, MAGNETISATION)).choice((SET, RESET), 3).tolist()
         self.head = SensorHead(board, world, magnetisation, faults)
         self._noise = noise_level(board, world)
         self._inputs = AnalogInputs(self.head, Noise(self._noise, seed, power_up))
