@@ -39,6 +39,7 @@ FRAME_BYTE = Cost(8.0, "estimated: 12 bytecodes a byte for the check sum, as in 
 ROOT = Cost(12.0, "estimated: a float operation and a call")
 
 UNKNOWNS, SIDES = 4, 3
+LOOKS = 3  # at the first block of points before the whole run, as in firmware/bp_selfcal.py
 ROW_BYTES = 69  # of a streamed frame before base64
 
 
@@ -68,13 +69,15 @@ def times_us(programs: dict[str, Program], board: Board) -> dict[str, Any]:
     }
     cycle_us = 1e6 / board.flip.rate_hz
     point_us = parts["undo_coil"] + parts["givens_row"]
-    cycles = board.selfcal.settle_cycles + board.selfcal.cycles_per_point
+    run = board.selfcal
+    cycles = run.settle_cycles + run.cycles_per_point
+    read = run.points + LOOKS * 6 * len(run.radii_ut)
     return {
         "parts": {name: round(value) for name, value in parts.items()},
         "flip_cycle": round(cycle_us),
         "sample": round(parts["sums_of_a_cycle"] + parts["undo"] + parts["frame"]),
         "selfcal_point": round(point_us),
-        "selfcal_run": round(board.selfcal.points * (cycles * cycle_us + point_us)),
+        "selfcal_run": round(run.points * cycles * cycle_us + read * point_us),
         "meaning": _MEANING,
         "sources": _sources(board),
     }
@@ -119,7 +122,7 @@ print(json.dumps(used))
 _MEANING = {
     "sample": "arithmetic of one streamed row; what does not fit beside sampling stretches the flip cycle",
     "selfcal_point": "arithmetic of one point, done after the coils are off",
-    "selfcal_run": "the whole run: flip cycles of all points and their arithmetic",
+    "selfcal_run": "flip cycles of all points, three looks at the first block, arithmetic of all points",
 }
 
 
