@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from barberpole.errors import InputError
+from barberpole.columns import READINGS
+from barberpole.errors import InputError, must
 from barberpole.fit import observability
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, Fit, setup_of
 from barberpole.fit.gram import accumulate
 from barberpole.fit.residual import Problem
 from barberpole.fit.start import Linear, start_values
 from barberpole.log import Log
-from barberpole.columns import READINGS
 from barberpole.methods.ellipsoid import Ellipsoid, algebraic, coverage_message
 from barberpole.model import compose
 from barberpole.modelfile import ModelFile
@@ -33,10 +33,8 @@ def ellipsoid(log: Log, reference: dict | None = None) -> tuple[Fit, ModelFile]:
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude
     if seen.b_mag is not None and np.ptp(seen.b_mag) > 1e-3 * known:
-        raise InputError(
-            "an ellipsoid fit must have one field magnitude; got b_ut from "
-            f"{seen.b_mag.min():.4g} to {seen.b_mag.max():.4g} µT (fit without --method takes them all)"
-        )
+        got = f"b_ut from {seen.b_mag.min():.4g} to {seen.b_mag.max():.4g} µT (fit without --method takes them all)"
+        raise InputError(must("an ellipsoid fit", "given one field magnitude", got, log.path))
     shape = algebraic(seen.y, known)
     return _judged(shape, seen, known), file
 
@@ -46,9 +44,8 @@ def demodulated(log: Log) -> Observations:
     plain = replace(log, columns={n: v for n, v in log.columns.items() if "_set_" not in n and "_reset_" not in n})
     seen = observations(plain)
     if np.any(seen.at.state) or not log.has(*READINGS):
-        raise InputError(
-            "an ellipsoid fit must have demodulated readings; got SET and RESET in turns in x_lsb.. (fit without --method takes them)"
-        )
+        got = "SET and RESET in turns in x_lsb.. (fit without --method takes them)"
+        raise InputError(must("an ellipsoid fit", "given demodulated readings", got, log.path))
     magnitude = np.linalg.norm(seen.b_ut, axis=0) if seen.b_ut is not None else seen.b_mag
     return replace(seen, b_ut=None, b_mag=magnitude, reference="constant" if magnitude is None else "magnitude")
 
