@@ -13,6 +13,7 @@ demodulated readings they cancel but for what the offset makes of them, and the 
 import numpy as np
 
 from barberpole.effects import scan
+from barberpole.effects.codes import error, terms
 from barberpole.effects.effect import Array, Conditions, Effect, Param, Setup, Shape, per_axis
 from barberpole.errors import InputError, must
 
@@ -45,31 +46,6 @@ def _ripple(setup: Setup):
     return *found, Param("period", "LSB", period, low, high, None, period, inner=True)
 
 
-def _terms(codes, p):
-    """Pairs of what a parameter multiplies and its slope by the code, (3, n) each, in steps of three parameters."""
-    if len(p) == 9:
-        return [(codes * _sign(codes), _sign(codes)), (codes**2, 2.0 * codes), (codes**3, 3.0 * codes**2)]
-    found = []
-    for h in range(1, (len(p) - 1) // 6 + 1):
-        turn = 2.0 * np.pi * h / p[-1]
-        sine, cosine = np.sin(turn * codes), np.cos(turn * codes)
-        found += [(sine, turn * cosine), (cosine, -turn * sine)]
-    return found
-
-
-def _sign(codes):
-    return np.where(np.real(codes) < 0.0, -1.0, 1.0)
-
-
-def _error(codes, p):
-    """What the law adds to the codes (3, n), and its slope by the code."""
-    groups = [np.asarray(p[j : j + 3])[:, None] for j in range(0, len(p) - len(p) % 3, 3)]
-    error, slope = np.zeros(codes.shape), np.zeros(codes.shape)
-    for group, (value, steepness) in zip(groups, _terms(codes, p), strict=True):
-        error, slope = error + group * value, slope + group * steepness
-    return error, slope
-
-
 def _codes(xyz, at: Conditions):
     """Raw codes (3, n) and the sign that makes them."""
     sign = np.asarray(at.state, float) if at.raw_polarity else 1.0
@@ -79,7 +55,7 @@ def _codes(xyz, at: Conditions):
 def forward(xyz, p, at: Conditions):
     """Eq. (1) or (2), LSB."""
     codes, sign = _codes(xyz, at)
-    return tuple(np.asarray(xyz) + sign * _error(codes, p)[0])
+    return tuple(np.asarray(xyz) + sign * error(codes, p)[0])
 
 
 def undo(xyz, p, at: Conditions):
@@ -87,8 +63,8 @@ def undo(xyz, p, at: Conditions):
     wanted, sign = _codes(xyz, at)
     codes = wanted
     for _ in range(NEWTON_STEPS):
-        error, slope = _error(codes, p)
-        step = (wanted - codes - error) / (1.0 + slope)
+        wrong, slope = error(codes, p)
+        step = (wanted - codes - wrong) / (1.0 + slope)
         codes = codes + step
         if not np.nanmax(np.abs(step), initial=0.0) > DONE * np.nanmax(np.abs(codes), initial=0.0):
             break
@@ -98,8 +74,8 @@ def undo(xyz, p, at: Conditions):
 def jacobian(xyz, p, at: Conditions):
     """Slopes of (1) or (2)."""
     codes, sign = _codes(xyz, at)
-    slope = _error(codes, p)[1]
-    by_group = np.concatenate([value for value, _ in _terms(codes, p)])
+    slope = error(codes, p)[1]
+    by_group = np.concatenate([value for value, _ in terms(codes, p)])
     if len(p) == 9:
         return 1.0 + slope, sign * by_group
     d_p = np.zeros((3, len(p), codes.shape[1]))

@@ -16,9 +16,7 @@ An offset coil acts on its own die only (thesis 6.2.1): `at.coil_ut` adds to H_s
 import numpy as np
 
 from barberpole.effects.effect import Conditions, Effect, Setup, Shape, per_axis
-
-NEWTON_STEPS = 8  # at most: convergence is quadratic from the linear answer
-CONVERGED = 1e-12  # a step below this leaves value and complex step exact
+from barberpole.effects.film import eliminate, sine_cosine, tilt
 
 
 def params(setup: Setup):
@@ -37,23 +35,10 @@ def _fields(xyz, at: Conditions):
     return own, np.asarray(at.state) * h[list(at.easy_axis)]
 
 
-def _tangent(own, easy, k):
-    """t = tan(phi) of (1): t = k (H_s - s H_e t) sqrt(1 + t^2), by Newton from the linear answer."""
-    t = k * own / (1.0 + k * easy)
-    for _ in range(NEWTON_STEPS):
-        r = np.sqrt(1.0 + t * t)
-        torque = k * (own - easy * t)
-        step = (t - torque * r) / (1.0 + k * easy * r - torque * t / r)
-        t = t - step
-        if not np.max(np.abs(step), initial=0.0) > CONVERGED:
-            break
-    return t
-
-
 def forward(xyz, p, at: Conditions):
     """Eq. (2), µT, for one magnetisation (|s| = 1)."""
     own, easy = _fields(xyz, at)
-    t = _tangent(own, easy, np.asarray(p)[:, None])
+    t = tilt(own, easy, np.asarray(p)[:, None])
     return tuple((own - easy * t) / np.sqrt(1.0 + t * t))
 
 
@@ -63,43 +48,20 @@ def undo(xyz, p, at: Conditions):
     f gives the angle at once, sin(phi) cos(phi) = k f; then (2) is linear in the three fields,
     H_s = (f + s H_e sin(phi)) / cos(phi), and is solved by elimination.
     """
-    sin, cos = zip(*(_sine_cosine(k * f) for k, f in zip(p, xyz, strict=True)), strict=True)
+    sin, cos = zip(*(sine_cosine(k * f) for k, f in zip(p, xyz, strict=True)), strict=True)
     slope = [at.state * s / c for s, c in zip(sin, cos, strict=True)]
     level = [f / c for f, c in zip(xyz, cos, strict=True)]
     # a coil's field sits in the neighbour's own reading but not in this die's easy axis
     level = [v - slope[i] * at.coil_ut[at.easy_axis[i]] for i, v in enumerate(level)]
-    own = _eliminate(level, slope, at.easy_axis)
+    own = eliminate(level, slope, at.easy_axis)
     return tuple(own[i] - at.coil_ut[i] for i in range(3))
-
-
-def _sine_cosine(u):
-    """sin and cos of phi from u = sin(phi) cos(phi), |phi| < 45 degrees."""
-    cos = np.sqrt(0.5 + 0.5 * np.sqrt(1.0 - 4.0 * u * u))
-    return u / cos, cos
-
-
-def _eliminate(level, slope, easy):
-    """Solve h_i = level_i + slope_i h_easy(i) for the three h: every chain of easy axes ends in a pair or a triple."""
-    solved: list = [None, None, None]
-    for i in range(3):
-        j = easy[i]
-        if easy[j] == i:
-            solved[i] = (level[i] + slope[i] * level[j]) / (1.0 - slope[i] * slope[j])
-        elif easy[easy[j]] == i:
-            m = easy[j]
-            loop = 1.0 - slope[i] * slope[j] * slope[m]
-            solved[i] = (level[i] + slope[i] * (level[j] + slope[j] * level[m])) / loop
-    for i in range(3):
-        if solved[i] is None:
-            solved[i] = level[i] + slope[i] * solved[easy[i]]
-    return solved
 
 
 def joint(xyz, p, at: Conditions):
     """(2) and its slopes, through the implicit function theorem on (1)."""
     own, easy = _fields(xyz, at)
     k = np.asarray(p, float)[:, None]
-    t = _tangent(own, easy, k)
+    t = tilt(own, easy, k)
     r = np.sqrt(1.0 + t * t)
     torque = own - easy * t
     steep = 1.0 + k * (easy * r - torque * t / r)
