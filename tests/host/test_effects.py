@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -88,6 +89,11 @@ def test_every_effect_says_what_it_is():
         assert effect.source, effect.name
         assert effect.summary, effect.name
         assert not effect.summary.endswith("."), effect.name
+
+
+def test_every_effect_has_its_page():
+    page = (Path(__file__).parents[2] / "host/docs/physics.md").read_text()
+    assert [line[4:] for line in page.splitlines() if line.startswith("### ")] == [e.name for e in STACK]
 
 
 def test_unknown_name_is_refused_with_the_known_ones():
