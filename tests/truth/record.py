@@ -35,7 +35,7 @@ def scene_of(recipe: Recipe, rows: int) -> Scene:
     rng = np.random.default_rng(recipe.seed)
     turn = motion.planar if recipe.planar else motion.directions
     field = 50.0 * turn(rows, rng)
-    if recipe.reference == "vector":
+    if recipe.reference == "vector" and not recipe.planar:
         field = field * np.repeat(rng.uniform(0.6, 1.2, rows // 100 + 1), 100)[:rows]
     temp = (
         np.full(rows, 25.0) + 0.02 * rng.normal(size=rows)

@@ -8,10 +8,11 @@ import numpy as np
 
 from barberpole.diagnose.candidates import Absent, absent_effects
 from barberpole.diagnose.evidence import Evidence, examine
-from barberpole.diagnose.experiments import next_experiment
+from barberpole.diagnose.experiments import REST, next_experiment
 from barberpole.diagnose.noise import estimate
 from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
 from barberpole.diagnose.search import Found, recheck, search
+from barberpole.diagnose.still import Still, still
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
@@ -25,6 +26,7 @@ GEOMETRY = 30.0  # condition number of the linear part above which nothing is na
 BLIND = 0.05  # of an effect's RMS left by the baseline: below it this log cannot see the effect
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
+CLEAR = 0.1  # fall of the held-out error that no noise makes
 MAIN_CAUSE = 0.3  # of what can be explained: a suspect that leaves structure must take this much to be named
 LINEAR = ("bias", "scale", "misalignment")
 
@@ -86,6 +88,9 @@ def diagnose_observations(
     state_known: bool = True,
 ) -> Diagnosis:
     """The same on observations."""
+    at_rest = still(seen)
+    if at_rest is not None:
+        return _at_rest(seen, at_rest)
     try:
         fit = fit_observations(_about_its_temperature(seen), file, extra)
     except InputError as error:
@@ -128,6 +133,8 @@ def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found
     """The verdict from the evidence beside the model given and beside it with all effects found."""
     remains = _remains(last)
     verdict = _verdict(found, _covered(found, last), bool(remains))
+    if _unsure_of_noise(first) and not any(f.heldout_drop > CLEAR for f in found):
+        return _noise_unknown(first, absent, patterns(first))
     if verdict == "unexplained":
         found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, last)]
     visible = _visibility(last)
@@ -146,6 +153,31 @@ def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found
         next_experiment=next_experiment(verdict, groups, blind, remains if found else []),
         visibility=visible,
         fits=(fit, *(f.fit for f in found)),
+    )
+
+
+def _unsure_of_noise(first: Evidence) -> bool:
+    """A scalar residual of coloured noise that nobody measured: slow structure and noise look alike in it."""
+    noise = first.white.noise
+    return first.ground.normal is not None and noise.coloured and noise.source == "residual"
+
+
+def _noise_unknown(first: Evidence, absent: Absent, shown: list[Pattern]) -> Diagnosis:
+    fit, noise = first.fit, first.white.noise
+    visible = _visibility(first)
+    blind = tuple(n for n, v in visible.items() if v < BLIND)
+    return Diagnosis(
+        "inconclusive",
+        fit.problem.n,
+        noise.rms(fit.problem.n),
+        fit.rms_lsb,
+        (),
+        tuple(shown),
+        blind,
+        absent.unjudged,
+        f"the residual is correlated in time, and nothing says how much of that is the sensor's noise: {REST}",
+        visible,
+        (fit,),
     )
 
 
@@ -184,6 +216,13 @@ def _visibility(evidence: Evidence) -> dict[str, float]:
 
 def _suspect(found: Found) -> Suspect:
     return Suspect(found.effect, found.p_value, found.fit.rms_lsb, found.heldout_drop, found.rivals)
+
+
+def _at_rest(seen: Observations, found: Still) -> Diagnosis:
+    """A group of causes at most: nothing here tells one from another."""
+    suspects = tuple(Suspect(name, 1e-300, found.noise_lsb, 0.0, found.causes[1:]) for name in found.causes[:1])
+    n = seen.y.shape[1]
+    return Diagnosis("inconclusive", n, found.noise_lsb, found.rms_lsb, suspects, found.patterns, (), {}, found.advice)
 
 
 def _inconclusive(seen: Observations, why: str, fit: Fit | None = None, absent: Absent | None = None) -> Diagnosis:

@@ -9,7 +9,7 @@ from barberpole.diagnose.candidates import Absent
 from barberpole.diagnose.columns import Candidate
 from barberpole.diagnose.evidence import Evidence, bic_gain, examine, whitened_rss
 from barberpole.diagnose.table import heldout, project
-from barberpole.diagnose.tails import LIKELIER, beside_neighbours, wrong_readings
+from barberpole.diagnose.tails import LIKELIER, wrong_readings
 from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
@@ -17,7 +17,7 @@ from barberpole.fit.fit import Fit, believable, refit, setup_of
 
 ENOUGH = 10.0  # gain in BIC that a name needs
 REFITTED = 3  # candidates refitted exactly each round
-IN_REACH = 0.3  # of the best linear gain: below it a refit cannot win
+IN_REACH = 0.5  # of the best linear gain: below it a refit cannot win
 NEARLY = 0.9  # of the best gain: a rival whose held-out error is not clearly worse is not excluded
 MOST = 5  # effects added before giving up
 
@@ -77,8 +77,13 @@ def attempt(evidence: Evidence, at: int, extra: Sequence[Effect]) -> Trial | Non
     rss = project(table, baseline).rss
     rank = int(after.free.sum() - evidence.fit.free.sum())
     fall = evidence.projection.rss - rss
+    folds = heldout(table, baseline)
+    if (
+        folds.sum() >= heldout(evidence.table, evidence.baseline).sum()
+    ):  # it does not carry over to what it has not seen
+        return None
     gain = bic_gain(evidence.projection.rss, fall, rank, evidence.table.count, evidence.candidates[at].tried)
-    return Trial(evidence.candidates[at], after, gain, fall, heldout(table, baseline))
+    return Trial(evidence.candidates[at], after, gain, fall, folds)
 
 
 def doubtful_readings(evidence: Evidence, absent: Absent) -> Found | None:
@@ -87,7 +92,7 @@ def doubtful_readings(evidence: Evidence, absent: Absent) -> Found | None:
     if effect is None:
         return None
     residual = evidence.ground.residual
-    gain = wrong_readings(beside_neighbours(residual) if evidence.white.filter else residual)
+    gain = wrong_readings(residual, bool(evidence.white.filter))
     if gain <= LIKELIER:
         return None
     setup = setup_of(evidence.fit.problem.seen, evidence.fit.linear, absent.settings.get(effect.name))

@@ -5,28 +5,31 @@ import numpy as np
 LIKELIER = 15.0  # gain in log likelihood that a second, wider population must bring
 CLUMPED = 4.0  # in standard errors: squared residuals this alike from sample to sample are no single outliers
 EM_STEPS = 30
+LARGE = 9.0  # squared residuals count as this at most where their likeness is judged: giants would make any
+REACH = 2  # samples on either side that an outlier is held against
 STEP = 9  # samples on either side of a possible jump; medians of nine pass over single outliers
 MAD = 1.4826  # of a normal distribution: standard deviation over median absolute deviation
 
 
-def wrong_readings(z: np.ndarray) -> float:
-    """Evidence (log likelihood) for single outliers in white residuals (m, n); 0 if they come in clumps."""
-    square = z * z - np.mean(z * z, axis=1, keepdims=True)
-    limit = np.quantile(square, 0.999)  # a few giants would make any correlation
-    square = np.minimum(square, limit)
+def wrong_readings(residual: np.ndarray, coloured: bool) -> float:
+    """Evidence (log likelihood) for single outliers in residuals (m, n); 0 if they come in clumps."""
+    z, apart = (beside_neighbours(residual), 2 * REACH + 1) if coloured else (residual, 1)
+    spread = MAD * np.median(np.abs(z), axis=1, keepdims=True)
+    square = np.minimum((z / np.maximum(spread, 1e-300)) ** 2, LARGE)
     square -= square.mean(axis=1, keepdims=True)
-    alike = np.sum(square[:, 1:] * square[:, :-1]) / np.sum(square * square) * np.sqrt(square.size)
-    return 0.0 if alike > CLUMPED else two_populations(z.ravel())
+    alike = np.sum(square[:, apart:] * square[:, :-apart]) / np.sum(square * square) * np.sqrt(square.size)
+    return 0.0 if alike > CLUMPED else two_populations((z / np.maximum(spread, 1e-300)).ravel())
 
 
 def beside_neighbours(residual: np.ndarray) -> np.ndarray:
-    """Residuals (m, n) less the mean of the two on either side: in coloured noise an outlier then stands alone.
+    """Residuals (m, n) less the median of two on either side: in coloured noise an outlier then stands alone.
 
-    Whitening would smear it over what follows, and a median is not Gaussian.
+    Whitening would smear it over what follows.
     """
-    padded = np.pad(residual, ((0, 0), (2, 2)), mode="reflect")
     n = residual.shape[1]
-    return residual - 0.25 * sum(padded[:, at : at + n] for at in (0, 1, 3, 4))
+    padded = np.pad(residual, ((0, 0), (REACH, REACH)), mode="reflect")
+    around = [padded[:, at : at + n] for at in range(2 * REACH + 1) if at != REACH]
+    return residual - np.median(around, axis=0)
 
 
 def jumps(residual: np.ndarray) -> np.ndarray:

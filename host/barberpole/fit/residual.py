@@ -70,7 +70,7 @@ class Problem:
             y, d_p, _ = self.model.linearise(seen.b_ut[:, rows], p, at)
             return seen.y[:, rows] - y, d_p
         if self.remembers:
-            return self._by_differences(p, rows, sigma)
+            return self._with_memory(p, rows, sigma)
         residual, normal, d_p = self._distance(p, rows, sigma)
         return residual[None], (normal[0] * d_p[0] + normal[1] * d_p[1] + normal[2] * d_p[2])[None]
 
@@ -88,15 +88,19 @@ class Problem:
         across = np.sum(cofactor * cofactor, axis=(0, 1)) / (det * det) - steep * steep
         return (norm - known - sigma * sigma * across / (2.0 * known)) / steep, gradient / steep, d_p
 
-    def _by_differences(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
-        """The same where the fitted field of a sample depends on earlier readings: one inversion a parameter."""
-        base = self._distance(p, rows, sigma)[0]
-        sizes = [max(abs(v), abs(q.typical or 1.0)) for v, q in zip(p, self.model.params, strict=True)]
-        derivative = np.empty((len(p), base.size))
-        for j, size in enumerate(sizes):
-            step = np.zeros(len(p))
-            step[j] = DIFFERENCE * size
-            derivative[j] = (base - self._distance(p + step, rows, sigma)[0]) / step[j]
+    def _with_memory(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+        """The same where the fitted field of a sample depends on earlier readings.
+
+        Those effects' own derivatives are taken by one inversion each. The others' stand as if they had no memory:
+        right to first order in it, which leaves the answer consistent.
+        """
+        base, normal, d_p = self._distance(p, rows, sigma)
+        derivative = normal[0] * d_p[0] + normal[1] * d_p[1] + normal[2] * d_p[2]
+        for term in self.model.terms:
+            for j in range(term.at.start, term.at.stop) if term.effect.tangent else ():
+                step = np.zeros(len(p))
+                step[j] = DIFFERENCE * max(abs(p[j]), abs(self.model.params[j].typical or 1.0))
+                derivative[j] = (base - self._distance(p + step, rows, sigma)[0]) / step[j]
         return base[None], derivative[None]
 
     def counted(self, rows: slice) -> int:
