@@ -47,8 +47,8 @@ def _ripple(setup: Setup):
 
 
 def _codes(xyz, at: Conditions):
-    """Raw codes (3, n) and the sign that makes them."""
-    sign = np.asarray(at.state, float) if at.raw_polarity else 1.0
+    """Raw codes (3, n) and the sign that makes them; a demodulated reading has none of its own."""
+    sign = np.where(np.asarray(at.state) < 0, -1.0, 1.0) if at.raw_polarity else 1.0
     return sign * np.asarray(xyz), sign
 
 
