@@ -1,5 +1,6 @@
 """The composed model: order, states, derivatives, and the way back."""
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,3 +198,28 @@ def test_what_the_board_cannot_undo_is_refused_for_symbols():
     ):
         compose(("lag",), SETUP).undo((Symbol(),) * 3, [0.1, 0.1, 0.1], Conditions())
     assert np.shape(model.undo(tuple(field()), numbers(model), conditions(1.0))) == (3, N)
+
+
+@pytest.mark.bench
+def test_speed_of_derivatives_and_inverse(capsys: pytest.CaptureFixture):
+    """100 000 rows, seven effects, 30 parameters, as a multiple of one plain linear least-squares fit of them."""
+    n, model = 100_000, compose(SEVEN, SETUP)
+    p, b, at = numbers(model), field(n), conditions(n=n)
+    chunks = [slice(first, min(first + 4096, n)) for first in range(0, n, 4096)]
+    y = model.predict(b, p, at)
+    plain = _seconds(lambda: np.linalg.lstsq(np.vstack([b, np.ones(n)]).T, y.T, rcond=None))
+    slopes = _seconds(lambda: [model.linearise(b[:, r], p, at.take(r)) for r in chunks])
+    back = _seconds(lambda: [model.invert(y[:, r], p, at.take(r)) for r in chunks])
+    with capsys.disabled():
+        print(f"\nderivatives {slopes / plain:.1f}, inverse {back / plain:.1f} of a plain fit ({1e3 * plain:.0f} ms)")
+    assert slopes < 20 * plain
+    assert back < 30 * plain
+
+
+def _seconds(work, times: int = 3) -> float:
+    spent = []
+    for _ in range(times):
+        began = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - began)
+    return min(spent)
