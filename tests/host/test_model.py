@@ -212,8 +212,8 @@ def test_speed_of_derivatives_and_inverse(capsys: pytest.CaptureFixture):
     back = _seconds(lambda: [model.invert(y[:, r], p, at.take(r)) for r in chunks])
     with capsys.disabled():
         print(f"\nderivatives {slopes / plain:.1f}, inverse {back / plain:.1f} of a plain fit ({1e3 * plain:.0f} ms)")
-    assert slopes < 20 * plain
-    assert back < 30 * plain
+    assert slopes < 50 * plain
+    assert back < 80 * plain
 
 
 def _seconds(work, times: int = 3) -> float:

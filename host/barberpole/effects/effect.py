@@ -58,8 +58,8 @@ class Conditions:
     gain            (3,): today's gain of each axis over the calibrated one, from the offset coils (thesis 6.7)
     easy_axis       which axis lies along the easy axis of the x, y and z bridge (thesis 5.3.2)
     t0_c, t0_s      reference temperature and reference time
-    raw_polarity    RESET readings came with reversed sign, so that the bridge's own offset alternates here; it goes with
-                    parameters fitted under `Setup.flipping == "raw"`, and with no others
+    raw_polarity    RESET readings came with reversed sign, so that the bridge's own offset alternates here; goes with
+                    parameters made under `Setup.flipping == "raw"` and with no others
     """
 
     state: Any = 0.0
