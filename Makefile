@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: demo test lint bench docs clean
+.PHONY: demo test lint bench docs reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo
@@ -26,6 +26,9 @@ bench: $(STAMP)
 
 docs: $(STAMP)
 	@$(BIN)/python -m barberpole.docs host/docs
+
+reproduce: $(STAMP)
+	@$(BIN)/python -m barberpole.reproduce host/docs/reproduction.md
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis

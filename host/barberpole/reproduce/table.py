@@ -1,0 +1,60 @@
+"""All rows as one page of Markdown: a function of the code alone, without date, path or machine."""
+
+from pathlib import Path
+from types import ModuleType
+
+from barberpole.files import write_atomic
+from barberpole.reproduce.row import Row
+
+MODULES: tuple[ModuleType, ...] = ()
+"""In the order of the page."""
+
+INTRODUCTION = """# Published figures, reproduced
+
+Written by `make reproduce`. Each row is a number that a source prints (or a curve that it shows) and the same computed
+by the functions of this repository from the inputs that the source gives. A ratio outside 0.98 to 1.02 has a remark
+that says what in the source does not fit together.
+"""
+
+
+def all_rows() -> list[Row]:
+    """The rows of all modules, in the order of MODULES."""
+    return [row for module in MODULES for row in module.rows()]
+
+
+def markdown(rows: list[Row]) -> str:
+    """The page: one table for each source, rows as they come."""
+    parts = [INTRODUCTION, _summary(rows)]
+    for source in dict.fromkeys(row.source for row in rows):
+        parts.append(_table(source, [row for row in rows if row.source == source]))
+    return "\n".join(parts)
+
+
+def write_page(path: Path) -> None:
+    """Write the page to `path`."""
+    write_atomic(path, markdown(all_rows()))
+
+
+def _summary(rows: list[Row]) -> str:
+    printed = [row for row in rows if row.published is not None]
+    met = sum(row.met for row in printed)
+    return (
+        f"{len(rows)} rows; of {len(printed)} printed numbers {met} are met within 2 %, {len(printed) - met} are not.\n"
+    )
+
+
+def _table(source: str, rows: list[Row]) -> str:
+    lines = [f"## The {source}\n", "| item | quantity | unit | published | ours | ratio | remark |"]
+    lines.append("|---|---|---|--:|--:|--:|---|")
+    lines += [_line(row) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def _line(row: Row) -> str:
+    numbers = (_number(row.published), _number(row.ours), "" if row.ratio is None else f"{row.ratio:.3f}")
+    return "| " + " | ".join((row.item, row.quantity, row.unit, *numbers, row.remark)) + " |"
+
+
+def _number(value: float | None) -> str:
+    """Four digits: what the sources print has no more, and no machine differs there."""
+    return "" if value is None else f"{float(value) + 0.0:.4g}"
