@@ -11,7 +11,7 @@ from barberpole.diagnose.evidence import Evidence, examine
 from barberpole.diagnose.experiments import REST, next_experiment
 from barberpole.diagnose.noise import estimate
 from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
-from barberpole.diagnose.search import Found, recheck, search
+from barberpole.diagnose.search import Found, linear_drop, recheck, search
 from barberpole.diagnose.still import Still, still
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
@@ -26,6 +26,7 @@ GEOMETRY = 30.0  # condition number of the linear part above which nothing is na
 BLIND = 0.05  # of an effect's RMS left by the baseline: below it this log cannot see the effect
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
+ENOUGH_ROWS = 8  # residuals a column: with fewer, the colour of the noise is lost in what the columns take
 CLEAR = 0.1  # fall of the held-out error that no noise makes
 MAIN_CAUSE = 0.3  # of what can be explained: a suspect that leaves structure must take this much to be named
 LINEAR = ("bias", "scale", "misalignment")
@@ -102,6 +103,8 @@ def diagnose_observations(
     first = examine(fit, absent, None, extra)
     noise = first.background() if rest is None else estimate(rest.y, "rest")
     first = first.under(whitening(noise, fit.problem.n, first.ground.normal))
+    if _unsure_of_noise(first) and 0.0 < linear_drop(first) < 0.5 * CLEAR:
+        return _noise_unknown(first, absent, patterns(first))
     found, last = search(first, absent, extra)
     found = recheck(found, first.white, extra)
     return _conclude(first, last, absent, found)
@@ -133,7 +136,7 @@ def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found
     """The verdict from the evidence beside the model given and beside it with all effects found."""
     remains = _remains(last)
     verdict = _verdict(found, _covered(found, last), bool(remains))
-    if _unsure_of_noise(first) and not any(f.heldout_drop > CLEAR for f in found):
+    if verdict != "adequate" and _unsure_of_noise(first) and not any(f.heldout_drop > CLEAR for f in found):
         return _noise_unknown(first, absent, patterns(first))
     if verdict == "unexplained":
         found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, last)]
@@ -159,7 +162,10 @@ def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found
 def _unsure_of_noise(first: Evidence) -> bool:
     """A scalar residual of coloured noise that nobody measured: slow structure and noise look alike in it."""
     noise = first.white.noise
-    return first.ground.normal is not None and noise.coloured and noise.source == "residual"
+    if first.ground.normal is None or noise.source != "residual":
+        return False
+    too_few = first.table.count < ENOUGH_ROWS * first.design.count
+    return noise.coloured or (too_few and estimate(first.ground.residual, "residual").coloured)
 
 
 def _noise_unknown(first: Evidence, absent: Absent, shown: list[Pattern]) -> Diagnosis:

@@ -15,6 +15,8 @@ from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
 
+FEW = 4  # residuals a column: with fewer, what is left of them is no noise
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -57,7 +59,10 @@ class Evidence:
         return replace(self, white=white, table=table, projection=project(table, self.baseline))
 
     def background(self) -> Noise:
-        """The noise left by all that any candidate or covariate can take."""
+        """The noise left by all that any candidate or covariate can take; white in a log too short to tell."""
+        if self.table.count < FEW * self.design.count:
+            level = self.projection.rss * float(np.mean(self.white.noise.white)) / self.projection.freedom
+            return Noise(np.full(self.ground.residual.shape[0], level))
         g, last = self.products.table().total, self.design.count - 1
         size = np.sqrt(np.maximum(np.diag(g)[:last], 1e-300))
         inverse = np.linalg.pinv(g[:last, :last] / np.outer(size, size), rcond=1e-9, hermitian=True)

@@ -78,10 +78,8 @@ def attempt(evidence: Evidence, at: int, extra: Sequence[Effect]) -> Trial | Non
     rank = int(after.free.sum() - evidence.fit.free.sum())
     fall = evidence.projection.rss - rss
     folds = heldout(table, baseline)
-    if (
-        folds.sum() >= heldout(evidence.table, evidence.baseline).sum()
-    ):  # it does not carry over to what it has not seen
-        return None
+    if folds.sum() >= heldout(evidence.table, evidence.baseline).sum():
+        return None  # what it takes off does not carry over to stretches it has not seen
     gain = bic_gain(evidence.projection.rss, fall, rank, evidence.table.count, evidence.candidates[at].tried)
     return Trial(evidence.candidates[at], after, gain, fall, folds)
 
@@ -114,6 +112,12 @@ def promising(evidence: Evidence) -> list[tuple[float, int]]:
         if gain > max(ENOUGH, best.get(shape.effect.name, (0.0, 0))[0]):
             best[shape.effect.name] = (gain, at)
     return sorted(best.values(), reverse=True)[:REFITTED]
+
+
+def linear_drop(evidence: Evidence) -> float:
+    """Fall of the RMS that the best candidate promises; 0 if none is promising."""
+    shares = [evidence.projection.score(evidence.places[at])[0] for _, at in promising(evidence)]
+    return float(1.0 - np.sqrt(max(1.0 - max(shares, default=0.0) / evidence.projection.rss, 0.0)))
 
 
 def _refitted(evidence: Evidence, at: int) -> Fit:

@@ -177,7 +177,7 @@ def project(table: Table, baseline: np.ndarray) -> Projection:
     energy = np.diag(g).copy()
     size = np.sqrt(np.maximum(energy[baseline], 1e-300))
     values, vectors = np.linalg.eigh(g[np.ix_(baseline, baseline)] / np.outer(size, size))
-    kept = values > 1e-12 * max(values[-1], 1e-300)
+    kept = values > 1e-12 * np.max(values, initial=1e-300)
     basis = (vectors[:, kept] / np.sqrt(values[kept])) / size[:, None]
     cross = basis.T @ g[baseline]
     matrix = g - cross.T @ cross

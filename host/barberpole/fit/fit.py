@@ -194,17 +194,21 @@ def believable(residual: np.ndarray) -> np.ndarray:
     return apart <= OUTLIER * MAD * np.median(apart, axis=1, keepdims=True)
 
 
+def _freeze_undetermined(model: Model, solution: Solution, keep: np.ndarray) -> None:
+    """Take parameters out of the mask `keep`, the worst first, until all are determined."""
+    while (worst := observability.undetermined(model, solution.gram, keep)) is not None:
+        keep[worst] = False
+
+
 def _determined(problem: Problem, p: np.ndarray, free: np.ndarray, tick=None) -> Solution:
     """Freeze first what is dependent, then what is undetermined, at its null."""
     null = problem.model.null
     while True:
         solution = minimise(problem, p, free, tick)
         keep = observability.independent(solution.gram, free)
+        if solution.converged:  # the covariance says nothing of a fit that went astray
+            _freeze_undetermined(problem.model, solution, keep)
         if np.array_equal(keep, free):
-            worst = observability.undetermined(problem.model, solution.gram, free)
-            if worst is None:
-                return solution
-            keep = free.copy()
-            keep[worst] = False
+            return solution
         p = np.where(free & ~keep, null, solution.p)
         free = keep

@@ -1,0 +1,52 @@
+"""The comparison of model and measurement."""
+
+import json
+
+import numpy as np
+import pytest
+from barberpole.diagnose import Comparison, compare
+from barberpole.fit.fit import fit_log
+from truth.record import Recipe, record
+from truth.trials import BASE, log_of, model_of
+
+
+def comparison(recipe: Recipe) -> Comparison:
+    return compare(fit_log(log_of(record(recipe)), model_of(BASE)))
+
+
+def test_noise_alone_shows_no_pattern():
+    said = comparison(Recipe({}, seed=1))
+    assert said.patterns == ()
+    assert said.noise_lsb == pytest.approx(2.0, rel=0.05)  # of every recipe
+    assert set(said.rms_by_axis_lsb) == {"x", "y", "z"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "against", "shape"),
+    [
+        ("quadratic", "field_x", "quadratic"),
+        ("bias_temperature", "temp_c", "linear"),
+        ("drift", "t_s", "linear"),
+        ("triple", "field_x*field_y*field_z", "product"),
+        ("load_current", "load_a", "linear"),
+    ],
+)
+def test_a_pattern_is_named_by_its_covariate_and_shape(effect, against, shape):
+    said = comparison(Recipe({effect: 2.0}, seed=2))
+    on_x = [p for p in said.patterns if p.axis == "x"]
+    assert (on_x[0].against, on_x[0].shape) == (against, shape)
+
+
+def test_curves_follow_the_distortion():
+    said = comparison(Recipe({"bias_temperature": 2.0}, seed=3))
+    curve = next(c for c in said.curves if (c.axis, c.against) == ("x", "temp_c"))
+    slope, *_ = np.polyfit(curve.x, curve.mean_lsb, 1)
+    assert abs(slope) > 5 * max(curve.error_lsb) / np.ptp(curve.x)
+
+
+def test_everything_is_json():
+    said = json.loads(json.dumps(comparison(Recipe({"cubic": 1.0}, reference="constant", seed=4)).to_json()))
+    assert set(said["rms_by_axis_lsb"]) == {"norm"}
+    assert said["rms_norm_percent"] > 0
+    assert len(said["sphere"]["norm"]) == 12
+    assert set(said["spectrum"]) == {"f_per_sample", "norm"}

@@ -1,0 +1,122 @@
+"""Naming a missing effect, on logs of the independent truth and on real ones."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from barberpole.diagnose import Diagnosis, diagnose
+from barberpole.log import read_log
+from truth.record import Recipe, record, rest
+from truth.trials import BASE, confusion, judge, log_of, model_of, rates, trials
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+KEYS = ["verdict", "n", "noise_lsb", "rms_lsb", "suspects", "patterns"]
+KEYS += ["cannot_be_seen", "cannot_be_judged", "next_experiment"]
+FROM_THE_DEMO = ("cross_field", "flip_asymmetry", "bias_temperature", "sensitivity_temperature", "misalignment")
+
+
+def said_of(recipe: Recipe, base: tuple[str, ...] = BASE, with_rest: bool = False) -> Diagnosis:
+    still = log_of(rest(recipe)) if with_rest else None
+    return diagnose(log_of(record(recipe)), model_of(base), still)
+
+
+def real(name: str) -> Diagnosis:
+    path = DATA / name
+    if not path.exists():
+        pytest.skip(f"needs the real log {name} in ../shared/data")
+    return diagnose(read_log(path), model_of(BASE))
+
+
+@pytest.mark.parametrize("effect", FROM_THE_DEMO)
+def test_pair_records_lacking_one_effect(effect):
+    base = ("bias", "scale") if effect == "misalignment" else BASE
+    said = said_of(Recipe({effect: 1.0}, form="pairs", rows=1500, seed=11), base)
+    assert said.verdict == "missing"
+    assert effect in (said.suspects[0].effect, *said.suspects[0].confounded_with)
+    assert said.suspects[0].rms_after_lsb == pytest.approx(2.0, rel=0.05)  # the noise of every recipe
+    assert said.suspects[0].heldout_drop > 0.1
+
+
+@pytest.mark.parametrize("form", ["flips", "demodulated", "unflipped", "pairs"])
+@pytest.mark.parametrize("corner", [0.0, 0.1])
+def test_nothing_missing_is_adequate(form, corner):
+    said = said_of(Recipe({}, form=form, corner=corner, seed=12))
+    assert (said.verdict, said.suspects) == ("adequate", ())
+
+
+def test_coloured_noise_of_a_scalar_log_is_taken_from_the_record_at_rest():
+    said = said_of(Recipe({}, reference="constant", corner=1 / 3, seed=13), with_rest=True)
+    assert said.verdict == "adequate"
+
+
+@pytest.mark.parametrize("effect", ["telegraph", "ripple", "triple"])
+def test_an_effect_of_no_catalogue_leaves_a_pattern(effect):
+    said = said_of(Recipe({effect: 3.0}, seed=14))
+    assert said.verdict == "unexplained" or "leave structure" in said.next_experiment
+    assert said.patterns
+
+
+def test_two_effects_are_found_one_after_another():
+    said = said_of(Recipe({"cross_field": 2.0, "bias_temperature": 2.0}, seed=15))
+    assert {s.effect for s in said.suspects} == {"cross_field", "bias_temperature"}
+    assert said.suspects[1].rms_after_lsb < said.suspects[0].rms_after_lsb < said.rms_lsb
+
+
+@pytest.mark.parametrize("reference", ["vector", "constant"])
+def test_a_planar_turn_is_inconclusive(reference):
+    said = said_of(Recipe({}, reference=reference, planar=True, seed=16))
+    assert said.verdict == "inconclusive"
+    assert "turn" in said.next_experiment
+
+
+def test_what_cannot_be_seen_or_judged_is_said():
+    columns = record(Recipe({}, form="unflipped", seed=17))
+    del columns["load_a"]
+    columns["temp_c"] = np.full(3000, 25.0)
+    columns["state"] = np.ones(3000)
+    said = diagnose(log_of(columns), model_of(BASE))
+    assert {"flip_asymmetry", "bias_temperature", "sensitivity_temperature"} <= set(said.cannot_be_seen)
+    assert said.cannot_be_judged["load_current"] == "no load_a column"
+
+
+@pytest.mark.parametrize("scale", [0.3, 10_000.0])
+def test_units_do_not_matter(scale):
+    said = said_of(Recipe({"quadratic": 0.5}, lsb_per_ut=scale, seed=18))
+    assert said.suspects[0].effect == "quadratic"
+
+
+def test_the_json_is_the_contract():
+    said = json.loads(json.dumps(said_of(Recipe({"drift": 1.0}, seed=19)).to_json()))
+    assert list(said) == KEYS
+    assert list(said["suspects"][0]) == ["effect", "p_value", "rms_after_lsb", "heldout_drop", "confounded_with"]
+    assert list(said["patterns"][0]) == ["axis", "against", "shape", "rms_lsb", "p_value"]
+
+
+def test_the_real_tilt_names_no_single_suspect():
+    said = real("hmc5883l_tilt_sphere.csv")
+    assert said.verdict != "missing"
+    assert not said.suspects
+
+
+def test_the_real_warming_cannot_tell_gain_from_bias():
+    said = real("hmc5883l_static_warming.csv")
+    assert said.verdict == "inconclusive"
+    assert {said.suspects[0].effect, *said.suspects[0].confounded_with} >= {
+        "bias_temperature",
+        "sensitivity_temperature",
+    }
+    assert "orientation" in said.next_experiment
+    assert {p.against for p in said.patterns} == {"temp_c"}
+
+
+def test_a_small_round_of_trials():
+    """One log in twelve of the plan; the rates of `make trials` come from many more."""
+    outcomes = [judge(trial) for trial in list(trials(1, 4_000_000))[::12]]
+    table = rates(outcomes)
+    hidden = [r for name, r in table.items() if name.startswith("vector, white") and "0.1" not in name]
+    logs = sum(r["logs"] for r in hidden)
+    assert sum(r["right"] * r["logs"] for r in hidden) >= 0.8 * logs
+    nothing = [r for name, r in table.items() if name.startswith("nothing")]
+    assert sum(r["missing"] * r["logs"] for r in nothing) <= 1
+    assert confusion(outcomes)
