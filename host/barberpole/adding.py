@@ -1,22 +1,27 @@
 """Put an effect into a model, or take one out, and say whether that pays."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from barberpole.effects import Effect
-from barberpole.fit.fit import Fit, fit_observations
+from barberpole.diagnose.candidates import Absent
+from barberpole.diagnose.evidence import examine
+from barberpole.diagnose.search import attempt
+from barberpole.effects import Effect, find_effect
+from barberpole.fit.fit import Fit, fit_observations, require_columns
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations
 
 EVIDENCE = 10.0  # fall of the information criterion below which an addition is not believed
+FORMS = 3  # of an effect, the most promising, that are fitted exactly
 
 
 @dataclass(frozen=True)
 class Change:
     """A model before and after one effect was added or removed, on the same log.
 
+    after_file  the model with the effect, and with the settings of the form that it takes in this log
     pays        the error on held-out stretches falls, by more than the new parameters' freedom explains
     evidence    fall of the Bayesian information criterion, with the residual's own correlation discounted
     """
@@ -24,6 +29,7 @@ class Change:
     effect: str
     before: Fit
     after: Fit
+    after_file: ModelFile
     noise_lsb: float
     evidence: float
 
@@ -52,11 +58,31 @@ def change(
     extra: Sequence[Effect] = (),
     tick: Callable[[int], None] | None = None,
 ) -> Change:
-    """Fit both models to the observations and compare them."""
+    """Fit both models to the observations and compare them.
+
+    An effect that is added may take several forms (a frequency, a period, a time constant to be searched); where the
+    model file does not settle that, the form that gains most is taken.
+    """
     old = fit_observations(seen, before, extra, tick)
-    new = fit_observations(seen, after, extra, tick)
+    require_columns(seen, after.effects, extra)
+    new = best_form(old, effect, after.settings, extra) if effect in after.effects else None
+    if new is None:
+        new = fit_observations(seen, after, extra, tick)
+    else:
+        name = find_effect(effect, extra).name
+        after = replace(after, settings=after.settings | {name: new.setups[name].settings})
     residual = new.problem.residual(new.p)
-    return Change(effect, old, new, noise_from_differences(residual), _evidence(old, new, residual))
+    return Change(effect, old, new, after, noise_from_differences(residual), _evidence(old, new, residual))
+
+
+def best_form(fit: Fit, effect: str, settings: dict[str, dict], extra: Sequence[Effect] = ()) -> Fit | None:
+    """The exact fit with an effect in the form that gains most, None where no form gains anything."""
+    absent = Absent((find_effect(effect, extra),), settings, {})
+    evidence = examine(fit, absent, None, extra)
+    gains = [evidence.gain(places) for places in evidence.places]
+    best = np.argsort(gains)[::-1][:FORMS]
+    trials = [trial for at in best if (trial := attempt(evidence, int(at), extra)) is not None]
+    return max(trials, key=lambda trial: trial.gain).fit if trials else None
 
 
 def _evidence(old: Fit, new: Fit, residual: np.ndarray) -> float:

@@ -123,7 +123,15 @@ def _readings(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Ch
 
 def _with_sensor(seen: Observations, fitted: Fitted, log: Log) -> Observations:
     """Observations under this sensor's conditions, with the gains in force on the board."""
-    at = replace(seen.at, easy_axis=fitted.easy_axis, t0_c=fitted.t0_c, gain=gains_in_force(log))
+    # the parameters say which readings they were fitted to; a demodulated log then sees nothing of what alternates
+    known = fitted.conditions(gain=gains_in_force(log))
+    at = replace(
+        seen.at,
+        easy_axis=known.easy_axis,
+        t0_c=known.t0_c,
+        gain=known.gain,
+        raw_polarity=known.raw_polarity,
+    )
     return replace(seen, at=at)
 
 

@@ -157,9 +157,9 @@ def _change(effect, model, log, output, sensor, as_json, edit) -> None:
     found = change(seen, before, after, effect, extra)
     if output:
         old = read_calibration(output) if output.exists() else None
-        write_calibration(_with_history(found, data, after, old, edit is add_effect), output)
+        write_calibration(_with_history(found, data, found.after_file, old, edit is add_effect), output)
     if before.path:
-        write_model(after, before.path)
+        write_model(found.after_file, before.path)
     if as_json:
         print_json(found.to_json())
     else:

@@ -164,10 +164,10 @@ class Story:
         """What `barberpole add` does, then the factory log once more under the larger model."""
         path = self.folder / "model.toml"
         old = read_model(path)
-        new = add_effect(old, effect)
-        write_model(new, path)
-        found = change(observations(before.session.log, bench.board.sensor), old, new, effect)
-        second = self._calibrate(bench, factory, new, "calibration-2.toml", before.calibration.history)
+        seen = observations(before.session.log, bench.board.sensor)
+        found = change(seen, old, add_effect(old, effect), effect)
+        write_model(found.after_file, path)
+        second = self._calibrate(bench, factory, found.after_file, "calibration-2.toml", before.calibration.history)
         return found, second
 
 
