@@ -13,6 +13,7 @@ from barberpole.diagnose.noise import estimate
 from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
 from barberpole.diagnose.search import Found, linear_drop, recheck, search
 from barberpole.diagnose.still import Still, still
+from barberpole.diagnose.stretches import in_full, part_of
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
@@ -100,14 +101,14 @@ def diagnose_observations(
     lack = _geometry(fit)
     if lack:
         return _inconclusive(seen, lack, fit, absent)
-    first = examine(fit, absent, None, extra)
+    first = examine(part_of(fit), absent, None, extra)
     noise = first.background() if rest is None else estimate(rest.y, "rest")
-    first = first.under(whitening(noise, fit.problem.n, first.ground.normal))
+    first = first.under(whitening(noise, first.fit.problem.n, first.ground.normal))
     if _unsure_of_noise(first) and 0.0 < linear_drop(first) < 0.5 * CLEAR:
         return _noise_unknown(first, absent, patterns(first))
     found, last = search(first, absent, extra)
     found = recheck(found, first.white, extra)
-    return _conclude(first, last, absent, found)
+    return _conclude(fit, first, last, absent, found)
 
 
 def _about_its_temperature(seen: Observations) -> Observations:
@@ -132,7 +133,7 @@ def _geometry(fit: Fit) -> str:
     return ""
 
 
-def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found]) -> Diagnosis:
+def _conclude(fit: Fit, first: Evidence, last: Evidence, absent: Absent, found: list[Found]) -> Diagnosis:
     """The verdict from the evidence beside the model given and beside it with all effects found."""
     remains = _remains(last)
     verdict = _verdict(found, _covered(found, last), bool(remains))
@@ -143,7 +144,7 @@ def _conclude(first: Evidence, last: Evidence, absent: Absent, found: list[Found
     visible = _visibility(last)
     blind = tuple(n for n, v in visible.items() if v < BLIND)
     groups = [(f.effect, *f.rivals) for f in found if f.rivals]
-    fit, white = first.fit, first.white
+    found, white = in_full(fit, found), first.white
     return Diagnosis(
         verdict=verdict,
         n=fit.problem.n,
