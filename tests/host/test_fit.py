@@ -101,3 +101,11 @@ def test_the_algebraic_ellipsoid_is_exact_without_noise():
     found = algebraic(np.linalg.solve(upper, u / np.linalg.norm(u, axis=0)) + centre)
     np.testing.assert_allclose(found.upper, upper, atol=1e-10)  # rounding, times a condition number of about 100
     np.testing.assert_allclose(found.centre, centre[:, 0], atol=1e-10)
+
+
+def test_effects_that_say_the_same_are_frozen_and_named_and_the_fit_stays_on_course():
+    columns = record(Recipe({}, seed=3))
+    one, both = fitted(columns), fitted(columns, "soft_iron")
+    assert both.converged
+    assert set(both.unobservable) == {"soft_iron.xy", "soft_iron.xz", "soft_iron.yz"}
+    assert both.heldout_rms_lsb == pytest.approx(one.heldout_rms_lsb, rel=1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 from barberpole.effects import Effect, Setup, find_effect
 from barberpole.errors import InputError
 from barberpole.fit import observability
-from barberpole.fit.gram import Gram, heldout_rms
+from barberpole.fit.gram import Gram, accumulate, heldout_rms
 from barberpole.fit.residual import Problem
 from barberpole.fit.solve import Solution, minimise
 from barberpole.fit.start import Linear, linear_part, start_values
@@ -203,9 +203,11 @@ def _freeze_undetermined(model: Model, solution: Solution, keep: np.ndarray) -> 
 def _determined(problem: Problem, p: np.ndarray, free: np.ndarray, tick=None) -> Solution:
     """Freeze first what is dependent, then what is undetermined, at its null."""
     null = problem.model.null
+    # a singular start leads a fit astray
+    free = free & ~observability.dependent(problem.model, accumulate(problem, p), free)
     while True:
         solution = minimise(problem, p, free, tick)
-        keep = observability.independent(solution.gram, free)
+        keep = observability.independent(problem.model, solution.gram, free)
         if solution.converged:  # the covariance says nothing of a fit that went astray
             _freeze_undetermined(problem.model, solution, keep)
         if np.array_equal(keep, free):

@@ -9,15 +9,18 @@ RANK = 1e-10  # squared sine of the angle to the earlier parameters' columns bel
 USELESS = 3.0  # a standard error this many times the size a real sensor shows says nothing about it
 
 
-def independent(gram: Gram, free: np.ndarray) -> np.ndarray:
-    """Mask of the free parameters whose columns are not combinations of earlier ones (stack order breaks ties)."""
+BASIC = ("bias", "scale", "misalignment")  # what every sensor has keeps its parameters where others could take them
+
+
+def independent(model: Model, gram: Gram, free: np.ndarray) -> np.ndarray:
+    """Mask of the free parameters whose columns are not combinations of others: basic ones first, then stack order."""
     h = gram.jj.sum(axis=0)
     size = np.sqrt(np.diag(h))
     usable = free & (size > 1e-12 * max(size.max(initial=0.0), 1e-300))
     size = np.where(usable, size, 1.0)
     corr = h / np.outer(size, size)
     keep = np.zeros_like(free)
-    for j in np.flatnonzero(usable):
+    for j in sorted(np.flatnonzero(usable), key=lambda j: model.names[j].split(".")[0] not in BASIC):
         kept = np.flatnonzero(keep)
         if kept.size:
             within = corr[np.ix_(kept, kept)]
@@ -26,6 +29,15 @@ def independent(gram: Gram, free: np.ndarray) -> np.ndarray:
             left = 1.0
         keep[j] = left > RANK
     return keep
+
+
+def dependent(model: Model, gram: Gram, free: np.ndarray) -> np.ndarray:
+    """Mask of the free parameters whose columns are there but combinations of others.
+
+    A column that is zero may come to life away from the start (a frequency whose amplitude is still null).
+    """
+    there = np.diag(gram.jj.sum(axis=0)) > 0
+    return free & there & ~independent(model, gram, free & there)
 
 
 def covariance(gram: Gram, free: np.ndarray) -> np.ndarray:
