@@ -9,7 +9,7 @@ from barberpole.diagnose.candidates import Absent
 from barberpole.diagnose.columns import Candidate
 from barberpole.diagnose.evidence import Evidence, bic_gain, examine, whitened_rss
 from barberpole.diagnose.table import heldout, project
-from barberpole.diagnose.tails import LIKELIER, wrong_readings
+from barberpole.diagnose.tails import LIKELIER, LIKELIER_COLOURED, wrong_readings
 from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
@@ -91,7 +91,7 @@ def doubtful_readings(evidence: Evidence, absent: Absent) -> Found | None:
         return None
     residual = evidence.ground.residual
     gain = wrong_readings(residual, bool(evidence.white.filter))
-    if gain <= LIKELIER:
+    if gain <= (LIKELIER_COLOURED if evidence.white.filter else LIKELIER):
         return None
     setup = setup_of(evidence.fit.problem.seen, evidence.fit.linear, absent.settings.get(effect.name))
     after = refit(evidence.fit, evidence.fit.setups | {effect.name: setup}, {})
@@ -137,7 +137,9 @@ def _found(evidence: Evidence, trials: list[Trial]) -> Found:
     for other in trials[1:]:
         apart = other.folds - best.folds
         unsure = apart.sum() < 2.0 * np.sqrt(len(apart)) * np.std(apart, ddof=1)
-        if best.gain - other.gain < ENOUGH or (unsure and other.gain > NEARLY * best.gain):
+        # a rival that takes off as much with more parameters is not excluded by having them
+        as_good = best.gain - other.gain < ENOUGH or best.fall - other.fall < ENOUGH
+        if as_good or (unsure and other.gain > NEARLY * best.gain):
             rivals.append(other.candidate.effect.name)
     drop = 1.0 - best.fit.heldout_rms_lsb / evidence.fit.heldout_rms_lsb
     place = next(p for c, p in zip(evidence.candidates, evidence.places, strict=True) if c is best.candidate)

@@ -3,6 +3,7 @@
 import numpy as np
 
 LIKELIER = 15.0  # gain in log likelihood that a second, wider population must bring
+LIKELIER_COLOURED = 30.0  # the same beside a median of neighbours, which is only nearly normal
 CLUMPED = 4.0  # in standard errors: squared residuals this alike from sample to sample are no single outliers
 EM_STEPS = 30
 LARGE = 9.0  # squared residuals count as this at most where their likeness is judged: giants would make any
