@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from barberpole.diagnose.columns import Candidate, Ground, candidate
+from barberpole.diagnose.columns import Candidate, candidate
+from barberpole.diagnose.ground import Ground
 from barberpole.effects import Effect, Setup, in_order
 from barberpole.effects.effect import Shape
 from barberpole.fit.fit import Fit, missing_columns, setup_of

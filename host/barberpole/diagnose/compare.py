@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from barberpole.diagnose.columns import Ground
 from barberpole.diagnose.covariates import covariates
 from barberpole.diagnose.evidence import examine
+from barberpole.diagnose.ground import Ground
 from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.patterns import Pattern, patterns
 from barberpole.diagnose.whitening import whitening

@@ -7,8 +7,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from barberpole.diagnose.candidates import Absent, candidates
-from barberpole.diagnose.columns import Candidate, Ground, ground_of
+from barberpole.diagnose.columns import Candidate
 from barberpole.diagnose.covariates import Covariate, covariates, ripples
+from barberpole.diagnose.ground import Ground, ground_of
 from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.table import Design, Products, Projection, Table, multiply, parts_of, project, tabulate
 from barberpole.diagnose.whitening import Whitening
