@@ -209,3 +209,11 @@ def test_version_is_a_version(call):
     code, out, _ = call("--version")
     assert code == 0
     assert re.fullmatch(r"\d+\.\d+\.\d+\S*\n", out)
+
+
+def test_compare_draws_a_page_that_opens_offline(call, answer, turned, tmp_path):
+    page = tmp_path / "compare.html"
+    assert call("compare", turned, "--model", LINEAR, "-o", page)[0] == 0
+    text = page.read_text()
+    assert f"{answer('compare', turned, '--model', LINEAR)['rms_lsb']:.4g} LSB rms" in text
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", text)

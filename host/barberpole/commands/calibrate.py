@@ -10,6 +10,7 @@ from barberpole.board import load_sensor
 from barberpole.calibrating import calibration_of, with_selfcal
 from barberpole.calibration import Calibration, read_calibration, write_calibration
 from barberpole.calibration_tables import Step
+from barberpole.commands import methods as published
 from barberpole.commands import show
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
 from barberpole.diagnose import compare as compare_fit
@@ -18,7 +19,6 @@ from barberpole.effects import Effect
 from barberpole.errors import BarberpoleError, InputError, must
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.log import Log, read_log, write_log
-from barberpole.methods.registry import find_method
 from barberpole.modelfile import ModelFile, add_effect, read_model, remove_effect, write_model
 from barberpole.observations import Observations, observations
 from barberpole.plugins import load_plugins
@@ -43,6 +43,7 @@ def fit(
     method: Annotated[str | None, typer.Option(help="A published method by name, for example ellipsoid.")] = None,
     output: OutOption = None,
     selfcal: Annotated[Path | None, typer.Option(help="Board record with the coil run of the same day.")] = None,
+    against: Annotated[Path | None, typer.Option(help="An earlier calibration, for offset_coil.")] = None,
     sensor: SensorOption = None,
     as_json: bool = AS_JSON,
 ) -> None:
@@ -50,7 +51,11 @@ def fit(
     if not (model or method):
         raise InputError(must("fit", "given --model or --method", "neither"))
     data = read_log(log)
-    found, file = _by_method(data, method, model) if method else _by_model(data, model, sensor)
+    answer = published.run(data, method, model, sensor, against) if method else None
+    if answer and answer.fit is None:
+        published.write_and_show(answer, data, method or "", output, as_json)
+        return
+    found, file = (answer.fit, answer.file) if answer and answer.file else _by_model(data, model, sensor)
     calibration = calibration_of(found, data, file, method or "fit")
     run = read_log(selfcal).selfcal if selfcal else data.selfcal
     if run is not None:
@@ -58,14 +63,11 @@ def fit(
     if output:
         write_calibration(calibration, output)
     if as_json:
-        print_json(show.fit_json(found, data))
+        print_json(show.fit_json(found, data) | published.to_json(answer, method))
     else:
         notes(data.notes)
         show.fit_tables(found, output)
-
-
-def _by_method(data: Log, method: str, model: str) -> tuple[Fit, ModelFile]:
-    return find_method(method)(data, read_model(model).reference if model else None)
+        published.show_values(answer)
 
 
 def _by_model(data: Log, model: str, sensor: str | None) -> tuple[Fit, ModelFile]:
@@ -85,11 +87,21 @@ def _sensor_of(data: Log, file: ModelFile, sensor: str | None) -> Sensor | None:
     return load_sensor(name) if name else None
 
 
-def compare(log: LogPath, model: ModelOption, sensor: SensorOption = None, as_json: bool = AS_JSON) -> None:
+def compare(
+    log: LogPath,
+    model: ModelOption,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="A page of pictures (.html).")] = None,
+    sensor: SensorOption = None,
+    as_json: bool = AS_JSON,
+) -> None:
     """Hold the model against the measurement: residual by axis and against every covariate."""
     data, file = read_log(log), read_model(model)
     seen, extra = _seen(data, file, sensor)
     found = compare_fit(fit_observations(seen, file, extra), extra=extra)
+    if output:
+        from barberpole.report.comparison import write_comparison  # here: drawing is slow to load
+
+        write_comparison(found, output, log.name, model)
     if as_json:
         print_json(found.to_json())
     else:
