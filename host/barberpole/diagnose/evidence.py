@@ -14,7 +14,7 @@ from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.table import Design, Products, Projection, Table, multiply, parts_of, project, tabulate
 from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
-from barberpole.fit.fit import Fit
+from barberpole.fit.fit import MAD, OUTLIER, Fit
 
 FEW = 4  # residuals a column: with fewer, what is left of them is no noise
 
@@ -68,6 +68,8 @@ class Evidence:
         size = np.sqrt(np.maximum(np.diag(g)[:last], 1e-300))
         inverse = np.linalg.pinv(g[:last, :last] / np.outer(size, size), rcond=1e-9, hermitian=True)
         left = self.design.combine(np.append(-inverse @ (g[:last, -1] / size) / size, 1.0))
+        limit = OUTLIER * MAD * np.median(np.abs(left), axis=1, keepdims=True)
+        left = np.clip(left, -limit, limit)  # a few giants would colour any spectrum
         return estimate(left, "residual", self.design.kept(self.products), self.ground.normal)
 
 
