@@ -5,7 +5,7 @@ import sys
 import typer
 
 from barberpole import __version__
-from barberpole.commands import board, calibrate, catalogue, demo, trajectory
+from barberpole.commands import board, calibrate, catalogue, demo, methods, trajectory
 from barberpole.errors import BarberpoleError
 
 BAD_INPUT = 2
@@ -19,6 +19,7 @@ app = typer.Typer(
 )
 calibrate.register(app)
 catalogue.register(app)
+methods.register(app)
 board.register(app)
 trajectory.register(app)
 demo.register(app)

@@ -55,7 +55,7 @@ def fit(
     if answer and answer.fit is None:
         published.write_and_show(answer, data, method or "", output, as_json)
         return
-    found, file = (answer.fit, answer.file) if answer and answer.file else _by_model(data, model, sensor)
+    found, file = (answer.fit, answer.file) if answer and answer.fit and answer.file else _by_model(data, model, sensor)
     calibration = calibration_of(found, data, file, method or "fit")
     run = read_log(selfcal).selfcal if selfcal else data.selfcal
     if run is not None:

@@ -1,72 +1,103 @@
-"""The published scalar methods as fits: their answer as bias, scale and misalignment, judged like any other fit."""
+"""The published scalar methods on a log: their answer as bias, scale and misalignment, judged like any other fit."""
 
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 
-from barberpole.columns import READINGS
-from barberpole.errors import InputError, must
-from barberpole.fit import observability
-from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, Fit, setup_of
-from barberpole.fit.gram import accumulate
-from barberpole.fit.residual import Problem
-from barberpole.fit.start import Linear, start_values
+from barberpole.errors import InputError
+from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, Fit
+from barberpole.fit.start import Linear
 from barberpole.log import Log
-from barberpole.methods.ellipsoid import Ellipsoid, algebraic, coverage_message
-from barberpole.model import compose
+from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
+from barberpole.methods.ellipsoid import Ellipsoid, algebraic, coverage_message, cramer_rao, efficient
+from barberpole.methods.iterative import iterative
+from barberpole.methods.readings import LINEAR_EFFECTS, judged, one_magnitude, scalar
 from barberpole.modelfile import ModelFile
-from barberpole.observations import Observations, observations
+from barberpole.observations import Observations
 
-EFFECTS = ("bias", "scale", "misalignment")
 GAIN_RATIO = 8.0  # between the axes of one sensor; more is a flat cloud drawn out into a sphere
 GAIN_STDERR = 0.05  # relative standard error of a gain above which the surface was not seen
+FILLED = 20.0  # %, RMS of |H|/K - 1: a ball of noise has 42, an evenly filled one 26, a bad real log 3
+WHAT = "an ellipsoid fit"
 
 
-def ellipsoid(log: Log, reference: dict | None = None) -> tuple[Fit, ModelFile]:
-    """Two-step ellipsoid (thesis 4.8-4.20) of a log whose field has one magnitude; its fit and the model it stands for.
+def ellipsoid(log: Log, given: Given) -> Answer:
+    """Two-step ellipsoid (thesis 4.8-4.20), sharpened to the Cramér-Rao bound, of a log whose field has one magnitude.
 
-    `reference` may give magnitude_ut; else the log's b_ut, else 50 µT with gains relative to it.
+    The reference may give magnitude_ut; else the log's b_ut, else 50 µT with gains relative to it.
     Raises InputError when the log does not surround the sensor, saying what is missing.
     """
-    file = ModelFile(EFFECTS, reference=reference or {})
-    seen = demodulated(log)
-    magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
-    known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude
-    if seen.b_mag is not None and np.ptp(seen.b_mag) > 1e-3 * known:
-        got = f"b_ut from {seen.b_mag.min():.4g} to {seen.b_mag.max():.4g} µT (fit without --method takes them all)"
-        raise InputError(must("an ellipsoid fit", "given one field magnitude", got, log.path))
-    shape = algebraic(seen.y, known)
-    return _judged(shape, seen, known), file
+    shapes = []
+
+    def shape_of(reading: np.ndarray, known: float) -> Ellipsoid:
+        shapes.extend((algebraic(reading, known), efficient(reading, known)))
+        return shapes[-1]
+
+    answer, seen, known = _answer(log, given, shape_of)
+    first, last = (1000.0 * _misfit_rms(shape, seen, known) for shape in shapes)
+    note = f"|H| - K rms: {first:.5g} nT after the algebraic step, {last:.5g} nT after the last"
+    return Answer(answer.values, answer.fit, answer.file, (note,))
 
 
-def demodulated(log: Log) -> Observations:
-    """The log as a scalar method sees it: one demodulated reading a row, and at most the magnitude of the field."""
-    plain = replace(log, columns={n: v for n, v in log.columns.items() if "_set_" not in n and "_reset_" not in n})
-    seen = observations(plain)
-    if np.any(seen.at.state) or not log.has(*READINGS):
-        got = "SET and RESET in turns in x_lsb.. (fit without --method takes them)"
-        raise InputError(must("an ellipsoid fit", "given demodulated readings", got, log.path))
-    magnitude = np.linalg.norm(seen.b_ut, axis=0) if seen.b_ut is not None else seen.b_mag
-    return replace(seen, b_ut=None, b_mag=magnitude, reference="constant" if magnitude is None else "magnitude")
+def ellipsoid_algebraic(log: Log, given: Given) -> Answer:
+    """The closed form alone (thesis 4.19), with its bias of order sigma²/K."""
+    return _answer(log, given, algebraic)[0]
 
 
-def _judged(shape: Ellipsoid, seen: Observations, known: float) -> Fit:
-    linear = Linear(np.linalg.inv(shape.upper), shape.centre, known)
-    setups = {name: setup_of(seen, linear) for name in EFFECTS}
-    model = compose(EFFECTS, setups)
-    problem = Problem(model, seen, known)
-    p = start_values(model, linear)
-    gram = accumulate(problem, p)
-    free = np.ones(len(p), bool)
-    fit = Fit(problem, p, observability.covariance(gram, free), gram, free, True, linear, setups)
-    _require_seen(fit, seen)
-    return fit
+def iterative_ellipsoid(log: Log, given: Given) -> Answer:
+    """The iterative ellipsoid (thesis 4.21-4.22). Raises InputError as `ellipsoid`, and where it does not settle."""
+    rounds = []
+
+    def shape_of(reading: np.ndarray, known: float) -> Ellipsoid:
+        found = iterative(reading, known)
+        if not found.settled:
+            raise InputError(f"{coverage_message(reading)}; {found.rounds} rounds of eq. 4.21 do not settle")
+        rounds.append(found.rounds)
+        return found.shape
+
+    answer = _answer(log, given, shape_of)[0]
+    return Answer(answer.values, answer.fit, answer.file, (f"settled after {rounds[0]} rounds of eq. 4.21",))
 
 
-def _require_seen(fit: Fit, seen: Observations) -> None:
-    """Refuse an ellipsoid that the data only suggest: a flat cloud drawn out, or gains of no certainty."""
+def _answer(log: Log, given: Given, shape_of: Callable) -> tuple[Answer, Observations, float]:
+    file = ModelFile(LINEAR_EFFECTS, reference=given.reference)
+    seen = scalar(log, WHAT)
+    otherwise_ut = float(given.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
+    known = one_magnitude(seen, otherwise_ut, WHAT, log.path)
+    shape = shape_of(seen.y, known)
+    fit = judged(Linear(np.linalg.inv(shape.upper), shape.centre, known), seen, known)
+    _require_certain(fit, seen)
+    return Answer(_values(shape, seen, known, fit.rms_lsb), fit, file), seen, known
+
+
+def _values(shape: Ellipsoid, seen: Observations, known: float, sigma_lsb: float) -> Values:
+    """L of 4.18 in µT/LSB, b of 4.20 in LSB, with the standard errors that the residual implies."""
+    stderr = np.sqrt(np.diag(cramer_rao(seen.y, shape, known, sigma_lsb)))
+    upper = np.zeros((3, 3))
+    upper[np.triu_indices(3)] = stderr[:6]
+    return (
+        matrix_values("L", shape.upper, upper, "uT/LSB")
+        | per_axis("b", shape.centre, stderr[6:], "LSB")
+        | {"K": value(known, 0.0, "uT")}
+    )
+
+
+def _misfit_rms(shape: Ellipsoid, seen: Observations, known: float) -> float:
+    """RMS of |H| - K over the readings, µT."""
+    return float(np.sqrt(np.mean((np.linalg.norm(shape.field(seen.y), axis=0) - known) ** 2)))
+
+
+def _require_certain(fit: Fit, seen: Observations) -> None:
+    """Refuse an ellipsoid that the data only suggest: a cloud filled, a flat one drawn out, gains of no certainty."""
     gains = {n: (v, s) for n, v, s in zip(fit.model.names, fit.p, fit.stderr, strict=True) if n.startswith("scale.")}
     values = np.abs([v for v, _ in gains.values()])
     worst = max(s / abs(v) for v, s in gains.values())
-    if values.max() > GAIN_RATIO * values.min() or worst > GAIN_STDERR:
+    filled = (fit.rms_norm_percent() or 0.0) > FILLED
+    if filled or values.max() > GAIN_RATIO * values.min() or worst > GAIN_STDERR:
         raise InputError(coverage_message(seen.y))
+
+
+def require_seen(seen: Observations, known: float) -> None:
+    """Raise InputError where readings in a field of one magnitude do not determine an ellipsoid."""
+    shape = algebraic(seen.y, known)
+    _require_certain(judged(Linear(np.linalg.inv(shape.upper), shape.centre, known), seen, known), seen)

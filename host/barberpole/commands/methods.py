@@ -1,0 +1,121 @@
+"""methods, calibrate-over-temperature, and what `fit --method` runs and shows."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tomlkit
+import typer
+from tomlkit.items import InlineTable
+
+from barberpole.board import load_sensor
+from barberpole.calibration import read_calibration
+from barberpole.calibration_tables import Value
+from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
+from barberpole.files import write_atomic
+from barberpole.log import Log, read_log
+from barberpole.methods.answer import Answer, Given, Values
+from barberpole.methods.over_temperature import values_of
+from barberpole.methods.over_temperature_log import from_logs
+from barberpole.methods.registry import METHODS, find_method
+from barberpole.modelfile import read_model
+
+FORMAT = 1
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands to the roof."""
+    app.command()(methods)
+    app.command("calibrate-over-temperature")(calibrate_over_temperature)
+
+
+def methods(as_json: bool = AS_JSON) -> None:
+    """The published methods: name, equations, the source's own words, what each needs of a log."""
+    if as_json:
+        fields = ("name", "equations", "words", "needs")
+        print_json({"methods": [{key: getattr(m, key) for key in fields} for m in METHODS]})
+        return
+    shown = table("methods, for fit --method NAME", "name", "equations", "in the source", "needs")
+    for column in shown.columns:
+        column.justify = "left"
+    for m in METHODS:
+        shown.add_row(m.name, m.equations, m.words, m.needs)
+    OUT.print(shown)
+
+
+def calibrate_over_temperature(
+    logs: Annotated[list[Path], typer.Argument(help="One log a temperature, five or more.")],
+    magnitude: Annotated[float, typer.Option(help="|B| in µT where the logs do not say.")] = 50.0,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="TOML of the polynomials.")] = None,
+    as_json: bool = AS_JSON,
+) -> None:
+    """Quadratic bias and cubic scale factors over temperature (thesis 6.1.3.2)."""
+    read = [read_log(path) for path in logs]
+    found = from_logs(read, Given({"magnitude_ut": magnitude}))
+    answer = Answer(values_of(found), notes=(f"{len(read)} temperatures",))
+    write_and_show(answer, read[0], "calibrate-over-temperature", output, as_json)
+
+
+def run(data: Log, method: str, model: str, sensor: str | None, against: Path | None) -> Answer:
+    """The method on a log, with what the command line and the log's board say beside it."""
+    file = read_model(model) if model else None
+    name = sensor or (file.sensor if file else None) or data.meta.get("sensor")
+    return find_method(method).run(
+        data,
+        Given(
+            dict(file.reference) if file else {},
+            load_sensor(name) if name else None,
+            read_calibration(against) if against else None,
+        ),
+    )
+
+
+def write_and_show(answer: Answer, data: Log, method: str, output: Path | None, as_json: bool) -> None:
+    """An answer that is a table of its own and no calibration."""
+    if output:
+        write_atomic(output, values_text(answer.values, data, method))
+    if as_json:
+        print_json({"n": data.n, "skipped": data.skipped} | to_json(answer, method))
+    else:
+        notes(data.notes)
+        show_values(answer)
+        if output:
+            OUT.print(f"figures written to {output}")
+
+
+def to_json(answer: Answer | None, method: str | None) -> dict:
+    """The method's part of `fit --json`; empty without one."""
+    if answer is None:
+        return {}
+    values = {name: {"value": v.value, "stderr": v.stderr, "unit": v.unit} for name, v in answer.values.items()}
+    return {"method": method, "values": values, "notes": list(answer.notes)}
+
+
+def show_values(answer: Answer | None) -> None:
+    """The method's own figures, for people."""
+    if answer is None:
+        return
+    shown = table("in the method's own terms", "figure", "value", "± 1 σ", "unit")
+    for name, v in answer.values.items():
+        shown.add_row(name, f"{v.value:.6g}", "" if np.isnan(v.stderr) else f"{v.stderr:.2g}", v.unit)
+    OUT.print(shown)
+    for note in answer.notes:
+        OUT.print(note)
+
+
+def values_text(values: Values, data: Log, method: str) -> str:
+    """The figures as TOML: what is not known is left out."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment(f"barberpole fit --method {method}: figures of the method, no calibration"))
+    document["format"] = FORMAT
+    document["method"] = method
+    document["log"] = {"name": data.path.name, "sha256": data.sha256}
+    document["values"] = {name: _line(v) for name, v in values.items()}
+    return tomlkit.dumps(document)
+
+
+def _line(v: Value) -> InlineTable:
+    line = tomlkit.inline_table()
+    known = {"value": v.value, "unit": v.unit} | ({} if np.isnan(v.stderr) else {"stderr": v.stderr})
+    line.update(known)
+    return line
