@@ -4,6 +4,7 @@ import sys
 
 import typer
 
+import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, so it comes first)
 from barberpole import __version__
 from barberpole.commands import board, calibrate, catalogue, demo, methods, trajectory
 from barberpole.errors import BarberpoleError

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from barberpole.diagnose.candidates import Absent, candidates
 from barberpole.diagnose.columns import Candidate
@@ -52,7 +52,7 @@ class Evidence:
         """Chance of a fall this large without a cause."""
         score, rank = self.projection.score(columns)
         left = max(self.projection.rss - score, 1e-300) / max(self.projection.freedom - rank, 1.0)
-        return float(max(chi2.sf(score / left, rank), 1e-300)) if rank else 1.0
+        return float(max(chdtrc(rank, score / left), 1e-300)) if rank else 1.0
 
     def under(self, white: Whitening) -> "Evidence":
         """The same evidence under another noise."""
