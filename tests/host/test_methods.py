@@ -135,6 +135,11 @@ def test_cross_axis_search_on_an_exact_film(form):
         assert np.allclose(found, [1.0, 1.0, -1.0], atol=0.03)  # the law 5.6 is the film's to first order in H/H_k
 
 
+def test_cross_axis_search_refuses_a_few_shots():
+    with pytest.raises(InputError, match="120 rows in 5 intervals"):
+        run("cross_axis_search", make_log(sphere(60, np.random.default_rng(7))))
+
+
 def test_corrections_in_the_limit_of_a_stiff_film():
     own, easy = np.array([10.0, 30.0]), np.array([5.0, -20.0])
     assert np.allclose(unflipped(own, own, easy, 1e9), own)

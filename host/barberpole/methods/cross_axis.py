@@ -31,7 +31,7 @@ COARSE, FINE, ROUNDS = 9, 3, 7  # points an axis of the first grid and of the fi
 class Search:
     """The best triple, the sums S of peak-to-peak before and after (µT), and the ellipsoid of the corrected readings.
 
-    rms_before, rms_after   of |H| - K, µT; corrected (3, n) readings in LSB
+    rms_before, rms_after   of |H| - K, µT
     """
 
     factors: np.ndarray
@@ -41,15 +41,14 @@ class Search:
     rms_before_ut: float
     rms_after_ut: float
     shape: Ellipsoid
-    corrected: np.ndarray
 
 
-def unflipped(v: np.ndarray, own: np.ndarray, easy: np.ndarray, anisotropy: np.ndarray) -> np.ndarray:
+def unflipped(v: np.ndarray, own: np.ndarray, easy: np.ndarray, anisotropy: np.ndarray | float) -> np.ndarray:
     """Eq. 5.6 with its sign restored; `easy` already carries the factor. All in one unit, arrays (n,) or (3, n)."""
     return v * np.sqrt(((anisotropy + easy) ** 2 + own**2) / (anisotropy**2 + own**2))
 
 
-def flipped(v: np.ndarray, own: np.ndarray, easy: np.ndarray, anisotropy: np.ndarray) -> np.ndarray:
+def flipped(v: np.ndarray, own: np.ndarray, easy: np.ndarray, anisotropy: np.ndarray | float) -> np.ndarray:
     """Eq. 5.9; `own` does not enter."""
     return v * (anisotropy**2 - easy**2) / anisotropy**2
 
@@ -81,18 +80,15 @@ def search(
     easy, hk = own[list(easy_axis)], np.asarray(anisotropy_ut, float)[:, None]
     law = flipped if is_flipped else unflipped
 
-    def corrected(factors: np.ndarray) -> np.ndarray:
-        return law(own, own, factors[:, None] * easy, hk)
-
     def cost(factors: np.ndarray) -> float:
-        field = corrected(factors)
+        field = law(own, own, factors[:, None] * easy, hk)
         try:
             return peak_to_peak_sum(_norm(algebraic(field, magnitude), field), first)
         except InputError:
             return np.inf
 
     best = _descend(cost, is_flipped)
-    field = corrected(best)
+    field = law(own, own, best[:, None] * easy, hk)
     final = algebraic(field, magnitude)
     before, after = _norm(shape, reading), _norm(final, field)
     return Search(
@@ -103,7 +99,6 @@ def search(
         _rms(before - magnitude),
         _rms(after - magnitude),
         Ellipsoid(final.upper / gain[:, 0], shape.centre + gain[:, 0] * final.centre),
-        gain * field + shape.centre[:, None],
     )
 
 

@@ -2,15 +2,19 @@
 
 import numpy as np
 
+from barberpole.errors import InputError, must
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
-from barberpole.methods.cross_axis import ANISOTROPY_UT, Search, intervals, require_anisotropy, search
+from barberpole.methods.cross_axis import ANISOTROPY_UT, WIDEST, Search, intervals, require_anisotropy, search
 from barberpole.methods.readings import one_magnitude, scalar
 from barberpole.methods.scalar import require_seen
+from barberpole.observations import Observations
 
 WHAT = "the cross-axis search"
 MOST_ROWS = 6000  # of the grid: enough for three factors, and a search of seconds
+LEAST_INTERVALS = 5  # whose peak-to-peak values are summed
+LEAST_ROWS = 120  # ten for each of nine parameters and three factors
 
 
 def cross_axis_search(log: Log, given: Given) -> Answer:
@@ -26,12 +30,23 @@ def cross_axis_search(log: Log, given: Given) -> Answer:
     hk = np.array(given.sensor.anisotropy_field_ut if given.sensor else ANISOTROPY_UT)
     easy = given.sensor.easy_axis_index if given.sensor else seen.at.easy_axis
     require_anisotropy(hk, known)
-    rows = slice(0, min(seen.y.shape[1], MOST_ROWS)) if seen.at.t_s is not None else slice(None)
-    y = seen.y[:, rows]
-    first = intervals(y.shape[1], None if seen.at.t_s is None else seen.at.t_s[rows])
+    y, first = _chosen(seen, log.path)
     tried = [search(y, known, hk, easy, first, form) for form in _forms(log)]
     best = min(tried, key=lambda found: found.sum_after_ut)
     return Answer(_values(best, hk), notes=_notes(best, len(tried)))
+
+
+def _chosen(seen: Observations, where: object) -> tuple[np.ndarray, np.ndarray]:
+    """Readings (3, m) of whole intervals spread over the log, and where each interval starts (k,)."""
+    first = intervals(seen.y.shape[1], seen.at.t_s)
+    rows = np.split(np.arange(seen.y.shape[1]), first[1:])
+    step = -(-seen.y.shape[1] // MOST_ROWS)
+    kept = rows[::step]
+    count = sum(r.size for r in kept)
+    if len(kept) < LEAST_INTERVALS or count < LEAST_ROWS:
+        wanted = f"given at least {LEAST_ROWS} rows in {LEAST_INTERVALS} intervals"
+        raise InputError(must(WHAT, wanted, f"{count} rows in {len(kept)}", where))
+    return seen.y[:, np.concatenate(kept)], np.cumsum([0] + [r.size for r in kept[:-1]])
 
 
 def _forms(log: Log) -> tuple[bool, ...]:
@@ -62,4 +77,7 @@ def _notes(found: Search, tried: int) -> tuple[str, ...]:
     form = "5.15-5.17 (flipped)" if found.flipped else "5.10-5.12 (not flipped)"
     how = "the better of both forms, for want of a column state" if tried > 1 else "as the log says"
     gain = found.rms_before_ut / max(found.rms_after_ut, 1e-300)
-    return (f"readings taken for {form}, {how}", f"residual of the norm {gain:.3g} times smaller")
+    said = (f"readings taken for {form}, {how}", f"residual of the norm {gain:.3g} times smaller")
+    if np.max(np.abs(found.factors)) < WIDEST:
+        return said
+    return (*said, f"a factor beyond {WIDEST:g}, the edge of the grid: H_k is not this, or this is no cross-field")

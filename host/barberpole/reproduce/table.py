@@ -4,9 +4,10 @@ from pathlib import Path
 from types import ModuleType
 
 from barberpole.files import write_atomic
+from barberpole.reproduce import thesis_calibration
 from barberpole.reproduce.row import Row
 
-MODULES: tuple[ModuleType, ...] = ()
+MODULES: tuple[ModuleType, ...] = (thesis_calibration,)
 """In the order of the page."""
 
 INTRODUCTION = """# Published figures, reproduced
