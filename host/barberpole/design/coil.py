@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import magpylib
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.spatial.transform import Rotation
 
 from barberpole.errors import LimitError, must
@@ -112,7 +112,8 @@ def uniform_half_side_mm(pair: CoilPair, tolerance: float) -> float:
     if excess(SMALLEST_REGION) > 0 or excess(LARGEST_REGION) < 0:
         least, most = (excess(r) + tolerance for r in (SMALLEST_REGION, LARGEST_REGION))
         raise LimitError(must("the tolerance", f"between {least:.2g} and {most:.2g} for this coil", f"{tolerance:g}"))
-    return pair.radius_mm * float(brentq(excess, SMALLEST_REGION, LARGEST_REGION, xtol=1e-9))
+    found = root_scalar(excess, bracket=(SMALLEST_REGION, LARGEST_REGION), xtol=1e-9)
+    return pair.radius_mm * float(found.root)
 
 
 def radius_for_region_mm(half_side_mm: float, tolerance: float, tilt_rad: float = 0.0) -> float:
