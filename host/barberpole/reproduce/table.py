@@ -4,17 +4,17 @@ from pathlib import Path
 from types import ModuleType
 
 from barberpole.files import write_atomic
-from barberpole.reproduce import thesis_calibration
+from barberpole.reproduce import thesis_apparatus, thesis_calibration, thesis_electronics, thesis_law
 from barberpole.reproduce.row import Row
 
-MODULES: tuple[ModuleType, ...] = (thesis_calibration,)
+MODULES: tuple[ModuleType, ...] = (thesis_law, thesis_electronics, thesis_calibration, thesis_apparatus)
 """In the order of the page."""
 
 INTRODUCTION = """# Published figures, reproduced
 
-Written by `make reproduce`. Each row is a number that a source prints (or a curve that it shows) and the same computed
-by the functions of this repository from the inputs that the source gives. A ratio outside 0.98 to 1.02 has a remark
-that says what in the source does not fit together.
+Written by `make reproduce`. Each row is a number that a source prints, a printed equation at one point, or a curve that
+it shows; and the same computed by the functions of this repository from the inputs that the source gives, or by another
+route. A ratio outside 0.98 to 1.02 has a remark that says what in the source does not fit together.
 """
 
 
@@ -53,7 +53,8 @@ def _table(source: str, rows: list[Row]) -> str:
 
 def _line(row: Row) -> str:
     numbers = (_number(row.published), _number(row.ours), "" if row.ratio is None else f"{row.ratio:.3f}")
-    return "| " + " | ".join((row.item, row.quantity, row.unit, *numbers, row.remark)) + " |"
+    cells = (row.item, row.quantity, row.unit, *numbers, row.remark)
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def _number(value: float | None) -> str:
