@@ -6,7 +6,7 @@ import typer
 
 import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, so it comes first)
 from barberpole import __version__
-from barberpole.commands import board, calibrate, catalogue, demo, methods, trajectory
+from barberpole.commands import board, calibrate, catalogue, demo, design, methods, trajectory
 from barberpole.errors import BarberpoleError
 
 BAD_INPUT = 2
@@ -23,6 +23,7 @@ catalogue.register(app)
 methods.register(app)
 board.register(app)
 trajectory.register(app)
+design.register(app)
 demo.register(app)
 
 
