@@ -8,6 +8,7 @@ from pathlib import Path
 from barberpole.errors import InputError, PortError, must
 from barberpole.files import read_text
 from barberpole.link import mpremote
+from barberpole.link.arriving import arriving
 
 RUN_FILE = "bp/run.bpr"  # the coil run and verdict of the last power-up, as bp_main writes it
 
@@ -58,4 +59,6 @@ def flash(folder: Path, port: str, say: Callable[[str], None] = lambda _: None) 
 
 def pull(port: str, target: Path) -> None:
     """The coil run and verdict of the last power-up, from the board's flash."""
-    mpremote.fetch(port, RUN_FILE, target)
+    mpremote.require_port(port)
+    with arriving(target) as beside:
+        mpremote.fetch(port, RUN_FILE, beside)

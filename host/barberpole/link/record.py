@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
 import serial
 
 from barberpole.errors import PortError, must
+from barberpole.link.arriving import arriving
 from barberpole.link.mpremote import require_port
 
 SILENCE_S = 8.0  # a running board sends a frame every few milliseconds, after at most two seconds of self-calibration
@@ -31,43 +33,60 @@ def record(
 ) -> int:
     """Write what the board sends to `target` (.bpr) until so many frames, so many seconds, or Ctrl-C; frames kept.
 
-    `start` is called once the port is open and listening. The file appears when the recording ends.
-    Raises PortError if the port is not there or the board stays silent; nothing is left then.
+    `start` is called once the port is open and listening. The file appears when the recording ends, by Ctrl-C or by an
+    unplugged cable too. Raises PortError if the port is not there or nothing was heard; no file is left then.
     """
     require_port(port)
-    beside = target.with_name(target.name + ".part")
-    try:
-        with serial.Serial(port, 115200, timeout=0.2) as line, beside.open("wb") as file:
-            start(line)
-            kept = 0
-            for text in islice(_frames(line, seconds), frames):
-                file.write(text)
-                kept += 1
-                if tick:
-                    tick(1)
-    except serial.SerialException as error:
-        beside.unlink(missing_ok=True)
-        raise PortError(must("the port", "one that can be opened", error, port)) from None
-    if not kept:
-        beside.unlink()
-        silence = f"silence for {SILENCE_S:.0f} s"
-        raise PortError(must(f"the board on {port}", "sending records (main.py running)", silence))
-    beside.replace(target)
+    with arriving(target) as beside:
+        kept = _record(port, beside, frames, _Clock(seconds), start, tick or (lambda _: None))
+        if not kept:
+            silence = f"silence for {SILENCE_S if seconds is None else min(seconds, SILENCE_S):g} s"
+            raise PortError(must(f"the board on {port}", "sending records (main.py running)", silence))
     return kept
 
 
-def _frames(line: Line, seconds: float | None) -> Iterator[bytes]:
-    """Lines that are frames, until the time is over, the board falls silent, or Ctrl-C."""
-    pending = b""
-    began = heard = time.monotonic()
+@dataclass(frozen=True)
+class _Clock:
+    """When to stop listening."""
+
+    seconds: float | None
+    began: float = field(default_factory=time.monotonic)
+
+    @property
+    def running(self) -> bool:
+        return self.seconds is None or time.monotonic() - self.began < self.seconds
+
+
+def _record(port: str, beside: Path, frames: int | None, clock: _Clock, start, tick) -> int:
+    """Frames written. Ctrl-C ends it where something was kept, and goes on to the caller where nothing was."""
+    kept = 0
     try:
-        while seconds is None or time.monotonic() - began < seconds:
-            block = line.read(max(1, line.in_waiting))
-            if block:
-                heard = time.monotonic()
-            elif time.monotonic() - heard > SILENCE_S:
-                return
-            *whole, pending = (pending + block).split(b"\n")
-            yield from (text.rstrip(b"\r") + b"\n" for text in whole if text.startswith(b"$"))
+        with serial.Serial(port, 115200, timeout=0.2) as line, beside.open("wb") as file:
+            start(line)
+            for text in islice(_frames(line, clock), frames):
+                file.write(text)
+                kept += 1
+                tick(1)
     except KeyboardInterrupt:
-        return
+        if not kept:
+            raise
+    except serial.SerialException as error:
+        raise PortError(must("the port", "one that can be opened", error, port)) from None
+    return kept
+
+
+def _frames(line: Line, clock: _Clock) -> Iterator[bytes]:
+    """Lines that are frames, until the time is over, the board falls silent, or the cable is unplugged."""
+    pending = b""
+    heard = time.monotonic()
+    while clock.running:
+        try:
+            block = line.read(max(1, line.in_waiting))
+        except OSError:  # SerialException among them: the board is gone, what it sent is kept
+            return
+        if block:
+            heard = time.monotonic()
+        elif time.monotonic() - heard > SILENCE_S:
+            return
+        *whole, pending = (pending + block).split(b"\n")
+        yield from (text.rstrip(b"\r") + b"\n" for text in whole if text.startswith(b"$"))
