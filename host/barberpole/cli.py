@@ -1,13 +1,14 @@
 """The command line: exit 0 done, 1 the answer is "no", 2 bad input with one clear sentence on stderr."""
 
 import sys
+import warnings
 
 import typer
 
 import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, so it comes first)
 from barberpole import __version__
-from barberpole.commands import board, calibrate, catalogue, demo, design, methods, trajectory
-from barberpole.errors import BarberpoleError
+from barberpole.commands import board, calibrate, catalogue, characterise, demo, design, methods, trajectory
+from barberpole.errors import BarberpoleError, must
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -21,6 +22,7 @@ app = typer.Typer(
 calibrate.register(app)
 catalogue.register(app)
 methods.register(app)
+characterise.register(app)
 board.register(app)
 trajectory.register(app)
 design.register(app)
@@ -44,8 +46,12 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; its exit code. Errors that a user can mend become one line on stderr."""
+    from numpy.linalg import LinAlgError
+
     try:
-        code = app(args=arguments, prog_name="barberpole", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # what they warn of shows in the answer, or is refused
+            code = app(args=arguments, prog_name="barberpole", standalone_mode=False)
     except typer.Exit as leave:
         return leave.exit_code
     except typer.TyperException as usage:
@@ -56,9 +62,14 @@ def run(arguments: list[str]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         return 0
+    except OSError as error:  # where nobody could say more: a full disk, a folder that is a file
+        return _refuse(must("a file or folder", "one that can be used", error.strerror or error, error.filename or ""))
+    except LinAlgError as error:
+        return _refuse(must("the log", "one that determines what is asked", f"readings without a solution: {error}"))
     return code if isinstance(code, int) else 0
 
 
 def _refuse(sentence: str) -> int:
-    print(f"barberpole: {' '.join(sentence.split())}", file=sys.stderr)
+    if sentence.strip():  # none where a bare `barberpole` has shown its help
+        print(f"barberpole: {' '.join(sentence.split())}", file=sys.stderr)
     return BAD_INPUT

@@ -217,3 +217,50 @@ def test_compare_draws_a_page_that_opens_offline(call, answer, turned, tmp_path)
     text = page.read_text()
     assert f"{answer('compare', turned, '--model', LINEAR)['rms_lsb']:.4g} LSB rms" in text
     assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", text)
+
+
+def test_a_folder_that_is_a_file_is_one_sentence(call, turned):
+    refused(call("demo", "-o", turned), str(turned))
+    refused(call("demo", "-o", turned / "x"), str(turned))
+    refused(call("convert", turned, "-o", turned / "x.csv"), str(turned))
+    refused(call("effect", "new", "mine", "--folder", turned), str(turned))
+
+
+def test_record_wants_a_count_that_can_be_reached(call, tmp_path):
+    refused(call("record", "--port", "/dev/ptmx", "-o", tmp_path / "a.bpr", "--rows", 0), "rows")
+    refused(call("record", "--port", "/dev/ptmx", "-o", tmp_path / "a.bpr", "--seconds", -1), "seconds")
+    assert not list(tmp_path.iterdir())
+
+
+def test_brackets_in_names_are_text(call, turned, tmp_path):
+    (tmp_path / "a[").mkdir()
+    odd = tmp_path / "a[" / "b].csv"  # to a reader of markup, the end of a style that never began
+    code, out, _ = call("convert", turned, "-o", odd)
+    assert (code, str(odd) in out) == (0, True)
+    damaged = odd.read_text().splitlines()
+    odd.write_text("\n".join([damaged[0], damaged[1].replace("0", "", 1)[:3], *damaged[2:]]) + "\n")
+    code, _, err = call("diagnose", odd, tmp_path / "a[" / "none].csv", "--model", LINEAR)
+    assert code == 2
+    assert f"{tmp_path}/a[/none].csv: " in err
+
+
+def test_readings_that_never_move_are_told(call, turned, tmp_path):
+    still = tmp_path / "still.csv"
+    head, first, *_ = turned.read_text().splitlines()
+    still.write_text("\n".join([head, *([first] * 200)]) + "\n")
+    for command in ("compare", "diagnose"):
+        code, _, err = call(command, still, "--model", LINEAR, "--json")
+        assert code in (0, 2)
+        assert err.count("\n") == (1 if code else 0)
+
+
+def test_new_effect_and_convert_answer_in_json(answer, turned, tmp_path):
+    assert answer("convert", turned, "-o", tmp_path / "t.parquet")["rows"] == 900
+    assert answer("effect", "new", "mine", "--folder", tmp_path)["path"].endswith("mine.py")
+
+
+def test_help_alone_is_no_complaint(call):
+    code, out, err = call()
+    assert code == 2
+    assert "calibrate" in out.lower()
+    assert not err

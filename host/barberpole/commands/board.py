@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from barberpole.calibration import read_calibration
-from barberpole.commands.console import AS_JSON, OUT, print_json, progress, table
+from barberpole.commands.console import AS_JSON, ERR, OUT, print_json, progress, table
 from barberpole.link.deploy import flash as flash_board
 from barberpole.link.deploy import pull as pull_run
 from barberpole.link.record import record as record_board
@@ -54,31 +54,45 @@ def _budget_table(budget: dict):
     return shown
 
 
-def flash(folder: Annotated[Path, typer.Argument(help="Folder made by build.")], port: PortOption) -> None:
+def flash(
+    folder: Annotated[Path, typer.Argument(help="Folder made by build.")], port: PortOption, as_json: bool = AS_JSON
+) -> None:
     """Put a build on a board through mpremote, verify it there, and restart the board."""
-    parcel = flash_board(folder, port, lambda text: OUT.print(text, style="dim"))
-    OUT.print(f"{port} runs calibration {parcel.calibration}")
+    parcel = flash_board(folder, port, lambda text: ERR.print(text, style="dim"))
+    if as_json:
+        print_json({"port": port, "calibration": parcel.calibration, "sha256": parcel.sha256})
+    else:
+        OUT.print(f"{port} runs calibration {parcel.calibration}")
 
 
 def record(
     port: PortOption,
     output: Annotated[Path, typer.Option("-o", "--output", help="Board records (.bpr).")],
-    rows: Annotated[int | None, typer.Option(help="Stop after so many records.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop after so many seconds.")] = None,
+    rows: Annotated[int | None, typer.Option(min=1, help="Stop after so many records.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many seconds.")] = None,
     restart: Annotated[bool, typer.Option(help="Begin with a soft reset, so that the power-up is in the log.")] = True,
+    as_json: bool = AS_JSON,
 ) -> None:
     """Record what a board streams, until --rows, --seconds or Ctrl-C."""
     with progress("recording", rows) as tick:
         kept = record_board(port, output, rows, seconds, soft_reset if restart else lambda _: None, tick)
-    OUT.print(f"{kept} records written to {output}")
+    if as_json:
+        print_json({"output": str(output), "records": kept})
+    else:
+        OUT.print(f"{kept} records written to {output}")
 
 
 def pull(
-    port: PortOption, output: Annotated[Path, typer.Option("-o", "--output", help="Board records (.bpr).")]
+    port: PortOption,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Board records (.bpr).")],
+    as_json: bool = AS_JSON,
 ) -> None:
-    """Fetch the coil run and the verdict of the last power-up from the board's flash."""
+    """Fetch the coil run and the verdict of the last power-up from the board's flash; the board stops streaming."""
     pull_run(port, output)
-    OUT.print(f"written to {output}")
+    if as_json:
+        print_json({"output": str(output)})
+    else:
+        OUT.print(f"written to {output}")
 
 
 def twin(

@@ -128,7 +128,9 @@ def diagnose(
             if len(logs) == 1:
                 raise
             bad = 2
-            print_json({"log": str(path), "error": str(error)}) if as_json else ERR.print(f"{path}: {error}")
+            print_json({"log": str(path), "error": str(error)}) if as_json else ERR.print(
+                f"{path}: {error}", soft_wrap=True
+            )
             continue
         if as_json:
             print_json(({"log": str(path)} if len(logs) > 1 else {}) | found.to_json())
@@ -204,9 +206,16 @@ def verify(
     return 0 if found.passed else 1
 
 
-def convert(log: LogPath, output: Annotated[Path, typer.Option("-o", "--output", help=".csv or .parquet")]) -> None:
+def convert(
+    log: LogPath,
+    output: Annotated[Path, typer.Option("-o", "--output", help=".csv or .parquet")],
+    as_json: bool = AS_JSON,
+) -> None:
     """Write a log in another format."""
     data = read_log(log)
     write_log(data, output)
     notes(data.notes)
-    OUT.print(f"{data.n} rows written to {output}")
+    if as_json:
+        print_json({"output": str(output), "rows": data.n, "skipped": data.skipped})
+    else:
+        OUT.print(f"{data.n} rows written to {output}")

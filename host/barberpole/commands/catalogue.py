@@ -32,7 +32,11 @@ def effects(as_json: bool = AS_JSON) -> None:
 def new(
     name: Annotated[str, typer.Argument(help="Name of the effect: small letters, digits and _.")],
     folder: Annotated[Path, typer.Option(help="Where to write the file.")] = Path(),
+    as_json: bool = AS_JSON,
 ) -> None:
     """Write a plugin file with the equation to fill in."""
     path = new_plugin(name, folder)
+    if as_json:
+        print_json({"path": str(path)})
+        return
     OUT.print(f'{path} written; fill in forward, then list it in the model file: plugins = ["{path.name}"]')

@@ -11,8 +11,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-OUT = Console(highlight=False, soft_wrap=True)
-ERR = Console(stderr=True, highlight=False)
+# No markup: a path or a column's name may hold brackets. Sentences are not wrapped: a line is a line in a pipe too.
+OUT = Console(highlight=False, markup=False, soft_wrap=True)
+ERR = Console(stderr=True, highlight=False, markup=False)
 
 AS_JSON = typer.Option(False, "--json", help="Print one JSON object and nothing else.")
 
@@ -43,7 +44,7 @@ def table(title: str, *heads: str) -> Table:
 def notes(sentences: tuple[str, ...]) -> None:
     """Remarks about the input, on stderr."""
     for sentence in sentences:
-        ERR.print(f"note: {sentence}", style="dim")
+        ERR.print(f"note: {sentence}", style="dim", soft_wrap=True)
 
 
 @contextmanager

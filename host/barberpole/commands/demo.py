@@ -30,8 +30,7 @@ def demo(
 
     if hidden not in HIDEABLE:
         raise InputError(must("the hidden effect", f"one of {', '.join(HIDEABLE)}", repr(hidden)))
-    folder = output or Path(tempfile.mkdtemp(prefix="barberpole-demo-"))
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = _writable(output) if output else Path(tempfile.mkdtemp(prefix="barberpole-demo-"))
     rows = (FACTORY_FIELDS + 2 * TODAY_FIELDS) * ROWS_PER_FIELD
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     began = time.monotonic()
@@ -39,11 +38,11 @@ def demo(
         task = bar.add_task("demo", total=rows)
 
         def chapter(title: str) -> None:
-            bar.console.print(f"[bold]{title}[/bold]")
+            bar.console.print(title, style="bold")
             bar.update(task, description=title[:48])
 
         def say(text: str) -> None:
-            bar.console.print(f"        {text}", style="dim")
+            bar.console.print(f"        {text}", style="dim", soft_wrap=True)
 
         outcome = Story(board, hidden, folder, seed, chapter, say, lambda n: bar.advance(task, n)).run()
     page = folder / "demo.html"
@@ -55,10 +54,19 @@ def demo(
     return 0 if outcome.named == (None if hidden == "none" else hidden) else 1
 
 
+def _writable(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(must("the output", "a folder that can be written", error.strerror, folder)) from None
+    return folder
+
+
 def _show(outcome, page: Path, seconds: float) -> None:
     answer = outcome.to_json()
     missing = f"{outcome.named} is missing" if outcome.named else "nothing is missing"
-    OUT.print(f"\n[bold]Hidden from the model: {outcome.hidden}. Verdict: {answer['verdict']}; {missing}.[/bold]")
+    verdict = f"\nHidden from the model: {outcome.hidden}. Verdict: {answer['verdict']}; {missing}."
+    OUT.print(verdict, style="bold")
     shown = table("", "error, rms", "before", "after", "noise")
     lsb_per_ut = float(sum(outcome.before.session.truth["scale_lsb_per_ut"]) / 3)
     for name, key in (("on the log", "rms"), ("held out", "heldout")):

@@ -68,8 +68,9 @@ def patterns(found: Sequence[Pattern]) -> None:
 def diagnosis(path: Path, found: Diagnosis) -> None:
     """Verdict first, then what it rests on."""
     OUT.print(
-        f"[bold]{path.name}: {found.verdict}[/bold]  ({found.n} readings, residual {found.rms_lsb:.4g} LSB, "
-        f"noise {found.noise_lsb:.4g} LSB)"
+        f"{path.name}: {found.verdict}  ({found.n} readings, residual {found.rms_lsb:.4g} LSB, "
+        f"noise {found.noise_lsb:.4g} LSB)",
+        style="bold",
     )
     if found.suspects:
         shown = table("suspects", "effect", "held-out fall", "rms after LSB", "p", "cannot be told from")
@@ -104,7 +105,7 @@ def change(found: Change, model: Path | None) -> None:
 
 def verification(found: Verification) -> None:
     """Pass or fail, and each check in a sentence."""
-    OUT.print("[bold]pass[/bold]" if found.passed else "[bold]FAIL[/bold]")
+    OUT.print("pass" if found.passed else "FAIL", style="bold")
     for check in found.checks:
         OUT.print(f"{'ok  ' if check.ok else 'FAIL'}  {check.sentence}")
 
