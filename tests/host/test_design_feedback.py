@@ -36,7 +36,9 @@ def test_no_loop_is_the_bare_slope():
 
 def test_power_two_ways():
     """The coil's share of what the supply gives is its voltage over the supply's."""
-    coil = OffsetCoil("a", 50.0, 4.6)
-    voltage = coil.resistance_ohm * coil.ma_per_gauss * 1e-3 * 0.5
-    assert feedback.coil_power_mw(coil, 0.5) == pytest.approx(feedback.supply_power_mw(coil, 0.5, 5.0) * voltage / 5.0)
-    assert feedback.coil_power_mw(coil, -0.5) == feedback.coil_power_mw(coil, 0.5)
+    coil = OffsetCoil("a", 50.0, 0.046)
+    voltage = coil.resistance_ohm * coil.ma_per_ut * 1e-3 * 50.0
+    assert feedback.coil_power_mw(coil, 50.0) == pytest.approx(
+        feedback.supply_power_mw(coil, 50.0, 5.0) * voltage / 5.0
+    )
+    assert feedback.coil_power_mw(coil, -50.0) == feedback.coil_power_mw(coil, 50.0)

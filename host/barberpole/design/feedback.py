@@ -21,21 +21,21 @@ NEWTON_STEPS = 6  # from the linear answer; convergence is quadratic
 
 @dataclass(frozen=True)
 class OffsetCoil:
-    """An offset coil: resistance, and the current for one gauss."""
+    """An offset coil: resistance, and the current for one microtesla."""
 
     name: str
     resistance_ohm: float
-    ma_per_gauss: float
+    ma_per_ut: float
 
 
-def coil_power_mw(coil: OffsetCoil, field_gauss: Array) -> Array:
+def coil_power_mw(coil: OffsetCoil, field_ut: Array) -> Array:
     """Eq. (2), mW."""
-    return 1e-3 * coil.resistance_ohm * (coil.ma_per_gauss * np.asarray(field_gauss)) ** 2
+    return 1e-3 * coil.resistance_ohm * (coil.ma_per_ut * np.asarray(field_ut)) ** 2
 
 
-def supply_power_mw(coil: OffsetCoil, field_gauss: Array, supply_v: float) -> Array:
+def supply_power_mw(coil: OffsetCoil, field_ut: Array, supply_v: float) -> Array:
     """Eq. (3), mW."""
-    return supply_v * coil.ma_per_gauss * np.abs(field_gauss)
+    return supply_v * coil.ma_per_ut * np.abs(field_ut)
 
 
 def coil_field_ut(h_s_ut: Array, h_e_ut: Array, h_k_ut: float, loop_gain: float) -> Array:

@@ -5,6 +5,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from barberpole.board import load_sensor
 from barberpole.design import amplifier, chopper, feedback, flipping
 from barberpole.design.parts import AMPLIFIERS, Amplifier, find_amplifier
 from barberpole.law.reading import reading_error_ut
@@ -24,12 +25,16 @@ THERMAL, INPUT, CURRENT, U3, BUFFER, TOTAL, RMS = 37.0, 329.0, 31.0, 7.5, 20.0, 
 BRIDGE_OHM_HMC1001, SENSITIVITY_HMC1001, SUPPLY_V_HMC1001 = 850.0, 320.0, 10.0  # nV/nT: 3.2 mV/V/G on 10 V (3.6)
 SENSITIVITY_HMC1021 = 55.0  # nV/nT: 1 mV/V/G (3.6) on 5 mA in 1100 ohm (3.4.2)
 
+ONE_GAUSS_UT = 1.0 * UT_PER_GAUSS
 COILS = (  # table 5.1: ohm, mA for one gauss, mW
-    (feedback.OffsetCoil("HMC1001", 1.5, 50.0), 3.8),
-    (feedback.OffsetCoil("HMC1021", 8.0, 5.0), 0.2),
-    (feedback.OffsetCoil("KMZ51", 170.0, 4.0), 2.7),
+    (feedback.OffsetCoil("HMC1001", 1.5, 50.0 / ONE_GAUSS_UT), 3.8),
+    (feedback.OffsetCoil("HMC1021", 8.0, 5.0 / ONE_GAUSS_UT), 0.2),
+    (feedback.OffsetCoil("KMZ51", 170.0, 4.0 / ONE_GAUSS_UT), 2.7),
 )
-DATA_SHEET_COILS = (feedback.OffsetCoil("HMC1001", 2.5, 50.0), feedback.OffsetCoil("HMC1021", 50.0, 4.6))
+DATA_SHEET_COILS = tuple(
+    feedback.OffsetCoil(name, sensor.offset_coil_ohm, 1.0 / sensor.offset_coil_ut_per_ma)
+    for name, sensor in (("HMC1001", load_sensor("hmc1001_1002")), ("HMC1021", load_sensor("hmc1021_1022")))
+)
 LOOP_GAIN = 100.0  # an example: the thesis gives none
 
 
@@ -168,15 +173,21 @@ def _sensors() -> list[Row]:
 
 def _feedback() -> list[Row]:
     rows = [
-        _row("table 5.1", f"power of the {coil.name} at 1 G", printed, float(feedback.coil_power_mw(coil, 1.0)), "mW")
+        _row(
+            "table 5.1",
+            f"power of the {coil.name} at 1 G",
+            printed,
+            float(feedback.coil_power_mw(coil, ONE_GAUSS_UT)),
+            "mW",
+        )
         for coil, printed in COILS
     ]
-    why = "table 5.1 takes the set/reset strap's resistance; the data sheet's offset coil: {:g} Ω, {:g} mA/G"
+    why = "table 5.1 takes the set/reset strap's resistance; the offset coil of our sensor file: {:g} Ω, {:.3g} mA/G"
     for coil in DATA_SHEET_COILS:
-        remark = why.format(coil.resistance_ohm, coil.ma_per_gauss)
-        power = float(feedback.coil_power_mw(coil, 1.0))
-        rows.append(_row("table 5.1", f"power of the {coil.name}, data sheet", None, power, "mW", remark))
-    fields = (1.0 * UT_PER_GAUSS, 3.0 * UT_PER_GAUSS, 8.0 * UT_PER_GAUSS)  # fig. 3.8
+        remark = why.format(coil.resistance_ohm, coil.ma_per_ut * ONE_GAUSS_UT)
+        power = float(feedback.coil_power_mw(coil, ONE_GAUSS_UT))
+        rows.append(_row("table 5.1", f"power of the {coil.name} at 1 G, its offset coil", None, power, "mW", remark))
+    fields = (ONE_GAUSS_UT, 3.0 * UT_PER_GAUSS, 8.0 * UT_PER_GAUSS)  # fig. 3.8
     bare = abs(float(reading_error_ut(*fields)))
     looped = abs(float(feedback.feedback_reading_ut(*fields, LOOP_GAIN)) - fields[0])
     example = "H_y = 1 G, H_x = 3 G, H_k = 8 G; loop gain 100"
