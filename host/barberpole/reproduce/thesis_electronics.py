@@ -157,7 +157,7 @@ def _whole() -> list[Row]:
     half = BRIDGE_OHM / 2.0
     current = math.sqrt(2.0) * amplifier.current_nv(amp04.current_fa, half)
     total = GAIN * math.hypot(amp04.input_nv, current, amplifier.thermal_nv(BRIDGE_OHM))
-    why = "45 nV and 4 pA/√Hz, not checked against a data sheet; the figure shows measured noise, with supply and sensor in it"
+    why = "45 nV and 4 pA/√Hz, not checked against a data sheet; measured, with supply and sensor, in the figure"
     return [*rows, _row("fig. 3.20", "output noise with AMP04, gain 60", None, total, "nV/√Hz", why)]
 
 
