@@ -57,6 +57,12 @@ def test_an_effect_of_no_catalogue_leaves_a_pattern(effect):
     assert said.patterns
 
 
+@pytest.mark.parametrize("form", ["flips", "demodulated", "unflipped"])
+def test_a_weak_bow_of_the_converter_and_of_the_bridge_are_one_group(form):
+    said = said_of(Recipe({"adc_inl": 0.12}, form=form, seed=500320))
+    assert {"adc_inl", "quadratic"} <= {said.suspects[0].effect, *said.suspects[0].confounded_with}
+
+
 def test_two_effects_are_found_one_after_another():
     said = said_of(Recipe({"cross_field": 2.0, "bias_temperature": 2.0}, seed=15))
     assert {s.effect for s in said.suspects} == {"cross_field", "bias_temperature"}

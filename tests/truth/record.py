@@ -1,6 +1,6 @@
 """A recording of the independent truth, as columns of the log contract or as a CSV file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -84,16 +84,13 @@ def record(recipe: Recipe) -> dict[str, np.ndarray]:
 def _pairwise(scene: Scene) -> Scene:
     """SET and RESET of one row see the same field, temperature and currents."""
     first = np.arange(scene.n) // 2 * 2
-    return Scene(
-        scene.field_ut[:, first],
-        scene.state,
-        scene.temp_c[first],
-        scene.t_s,
-        scene.load_a[first],
-        scene.i_ma[:, first],
-        scene.fs_hz,
-        scene.factors,
-        scene.noise_seed,
+    return replace(
+        scene,
+        field_ut=scene.field_ut[:, first],
+        temp_c=scene.temp_c[first],
+        load_a=scene.load_a[first],
+        i_ma=scene.i_ma[:, first],
+        raw=True,
     )
 
 

@@ -16,7 +16,10 @@ EASY = (1, 0, 1)  # the easy axis of the x, y and z bridge
 
 @dataclass(frozen=True)
 class Scene:
-    """What happens to the sensor: field (3, n) in µT, state (n,), the rest (n,) or (3, n); fs in Hz."""
+    """What happens to the sensor: field (3, n) in µT, state (n,), the rest (n,) or (3, n); fs in Hz.
+
+    raw: RESET readings are recorded with the sign that the converter saw.
+    """
 
     field_ut: np.ndarray
     state: np.ndarray
@@ -27,6 +30,7 @@ class Scene:
     fs_hz: float
     factors: np.ndarray = field(repr=False)  # (20, 3) random, of order one
     noise_seed: int = 0
+    raw: bool = False
 
     @property
     def n(self) -> int:
@@ -145,9 +149,12 @@ def coil_coupling(h, size, scene, state):
 
 
 def adc_inl(h, size, scene, state):
-    """A bow with a kink at mid scale, as of a converter whose top bit is a little wrong."""
-    u = h / 100.0
-    return h + size * scene.factors[11][:, None] * (np.abs(u) - 0.25)
+    """A bow with a kink at mid scale, as of a converter whose top bit is a little wrong.
+
+    It acts on what the converter sees: with the sign of RESET where the record keeps it.
+    """
+    u, seen = h / 100.0, state if scene.raw else 1.0
+    return h + seen * size * scene.factors[11][:, None] * (np.abs(u) - 0.25)
 
 
 def drift(h, size, scene, state):

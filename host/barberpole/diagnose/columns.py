@@ -23,6 +23,7 @@ class Candidate:
     """One form of an absent effect: its columns by channel in LSB per parameter unit, and the `names` of their
     parameters.
 
+    held: other parameters of the effect, which this form leaves alone.
     start: of a refit, by name; linear: the least-squares weights are better ones. even: a parameter of no sign, whose
     column is a secant because its derivative at the null is zero.
     """
@@ -36,6 +37,7 @@ class Candidate:
     even: np.ndarray
     start: dict[str, float]
     tried: int = 1
+    held: tuple[str, ...] = ()
 
 
 def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, Any], setup: Setup) -> Candidate:
@@ -62,6 +64,7 @@ def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, 
         even,
         start,
         shape.tried,
+        tuple(q.name for q, w in zip(params, wanted, strict=True) if not w and not q.inner),
     )
 
 

@@ -35,6 +35,11 @@ class Ground:
     normal: np.ndarray | None
     order: tuple[str, ...]
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the residual channels."""
+        return ("x", "y", "z") if self.normal is None else ("norm",)
+
     def baseline(self) -> np.ndarray:
         """(m, P, n): derivatives of the fitted model."""
         columns = self.fit.model.linearise(self.field, self.fit.p, self.fit.problem.seen.at)[1]

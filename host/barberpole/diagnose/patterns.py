@@ -6,6 +6,7 @@ import numpy as np
 
 from barberpole.diagnose.evidence import Evidence
 from barberpole.diagnose.tails import LIKELIER, jumps
+from barberpole.diagnose.words import shape_in_words
 
 SHOWN = 12  # patterns listed at most
 CHANCE = 1e-4  # p-value, corrected for the number of tests, below which a pattern is shown
@@ -36,9 +37,11 @@ def patterns(evidence: Evidence) -> list[Pattern]:
 
 def _pattern(evidence: Evidence, channel, covariate, columns, score, chance) -> Pattern:
     rms = float(np.sqrt(max(score, 0.0) / evidence.fit.problem.n * evidence.white.noise.white[channel]))
-    single = [evidence.projection.score(columns[j : j + 1])[0] for j in range(len(columns))]
-    shape = covariate.shapes[int(np.argmax(single))]
-    return Pattern(_axis(evidence, channel), covariate.name, shape, rms, chance)
+    projection = evidence.projection
+    strongest = int(np.argmax([projection.score(columns[j : j + 1])[0] for j in range(len(columns))]))
+    alone = float(projection.weights(columns[strongest : strongest + 1])[0][0])
+    shape = shape_in_words(covariate, strongest, alone, projection.weights(columns)[0])
+    return Pattern(evidence.ground.axes[channel], covariate.name, shape, rms, chance)
 
 
 def jump_patterns(evidence: Evidence) -> list[Pattern]:
@@ -48,9 +51,5 @@ def jump_patterns(evidence: Evidence) -> list[Pattern]:
         if gain > LIKELIER:
             rms = float(np.sqrt(np.mean(residual[channel] ** 2)))
             chance = float(max(np.exp(-gain), 1e-300))
-            found.append(Pattern(_axis(evidence, channel), "t_s", "jumps between levels", rms, chance))
+            found.append(Pattern(evidence.ground.axes[channel], "t_s", "step: jumps between levels", rms, chance))
     return found
-
-
-def _axis(evidence: Evidence, channel: int) -> str:
-    return "xyz"[channel] if len(evidence.ground.residual) == 3 else "norm"

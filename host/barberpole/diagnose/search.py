@@ -18,6 +18,7 @@ from barberpole.fit.fit import Fit, believable, refit, setup_of
 ENOUGH = 10.0  # gain in BIC that a name needs
 REFITTED = 3  # candidates refitted exactly each round
 IN_REACH = 0.5  # of the best linear gain: below it a refit cannot win
+ALIKE = 0.8  # correlation of what an effect explains with what another can: above, they are confusable
 NEARLY = 0.9  # of the best gain: a rival whose held-out error is not clearly worse is not excluded
 MOST = 5  # effects added before giving up
 
@@ -62,9 +63,25 @@ def search(evidence: Evidence, absent: Absent, extra: Sequence[Effect] = ()) -> 
 def best_addition(evidence: Evidence, extra: Sequence[Effect]) -> Found | None:
     """The effect that gains most by exact refit, if any gains enough."""
     ranked = promising(evidence)
-    trials = [attempt(evidence, at, extra) for gain, at in ranked if gain >= IN_REACH * ranked[0][0]]
+    tried = [at for gain, at in ranked if gain >= IN_REACH * ranked[0][0]]
+    trials = [attempt(evidence, at, extra) for at in tried]
     worth = sorted((t for t in trials if t and t.gain > ENOUGH), key=lambda t: -t.gain)
-    return _found(evidence, worth) if worth else None
+    if not worth:
+        return None
+    others = [attempt(evidence, at, extra) for at in alike(evidence, worth[0], tried)]
+    return _found(evidence, worth + [t for t in others if t])
+
+
+def alike(evidence: Evidence, best: Trial, tried: Sequence[int]) -> list[int]:
+    """Forms of effects not tried yet that could pass for the best: what it explains, they explain nearly as well."""
+    done = {evidence.candidates[at].effect.name for at in tried}
+    signal = evidence.places[next(i for i, c in enumerate(evidence.candidates) if c is best.candidate)]
+    close: dict[str, tuple[float, int]] = {}
+    for at, shape in enumerate(evidence.candidates):
+        likeness = 0.0 if shape.effect.name in done else evidence.projection.likeness(signal, evidence.places[at])
+        if likeness > max(ALIKE, close.get(shape.effect.name, (0.0, 0))[0]):
+            close[shape.effect.name] = (likeness, at)
+    return [at for _, at in sorted(close.values(), reverse=True)[:REFITTED]]
 
 
 def attempt(evidence: Evidence, at: int, extra: Sequence[Effect]) -> Trial | None:
@@ -129,7 +146,8 @@ def _refitted(evidence: Evidence, at: int) -> Fit:
         weights = evidence.projection.weights(evidence.places[at])[0]
         weights = np.where(shape.even, np.sqrt(np.abs(weights * shape.typical)), weights)
         start |= {f"{name}.{key}": float(w) for key, w in zip(shape.names, weights, strict=True)}
-    return refit(evidence.fit, evidence.fit.setups | {name: shape.setup}, start)
+    hold = frozenset(f"{name}.{key}" for key in shape.held)
+    return refit(evidence.fit, evidence.fit.setups | {name: shape.setup}, start, hold)
 
 
 def _found(evidence: Evidence, trials: list[Trial]) -> Found:
@@ -156,8 +174,9 @@ def recheck(found: list[Found], white: Whitening, extra: Sequence[Effect] = ()) 
     count, names = float(last.gram.count), {f.effect for f in found}
     for one in found:
         without = {k: v for k, v in last.setups.items() if k != one.effect}
-        rss = project(*whitened_rss(refit(last, without, {}), white, extra)).rss
-        lost = int(last.free.sum()) - sum(len(t.params) for t in last.model.terms if t.effect.name != one.effect)
+        fit = refit(last, without, {})
+        rss = project(*whitened_rss(fit, white, extra)).rss
+        lost = int(last.free.sum()) - int(fit.free.sum())
         if bic_gain(rss, rss - total, max(lost, 1), count) < ENOUGH and one.effect != kept[-1].effect:
             kept.remove(one)
     return [replace(f, rivals=tuple(r for r in f.rivals if r not in names)) for f in kept]

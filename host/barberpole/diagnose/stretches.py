@@ -42,7 +42,7 @@ def in_full(fit: Fit, found: Sequence[Found]) -> list[Found]:
     out, last = [], fit
     for one in found:
         start = dict(zip(one.fit.model.names, (float(v) for v in one.fit.p), strict=True))
-        after = refit(last, one.fit.setups, start)
+        after = refit(last, one.fit.setups, start, one.fit.held)
         drop = 1.0 - after.heldout_rms_lsb / last.heldout_rms_lsb
         out.append(replace(one, fit=after, heldout_drop=drop))
         last = after

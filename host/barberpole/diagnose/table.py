@@ -158,11 +158,24 @@ class Projection:
 
     def weights(self, columns: np.ndarray) -> tuple[np.ndarray, int]:
         """Least-squares weights, in the directions that survive the baseline."""
+        inverse, rank = self.inverse(columns)
+        return inverse @ self.matrix[columns, -1], rank
+
+    def inverse(self, columns: np.ndarray) -> tuple[np.ndarray, int]:
+        """Pseudo-inverse of their Gram matrix, and its rank."""
         size = np.sqrt(np.maximum(self.energy[columns], 1e-300))
         values, vectors = np.linalg.eigh(self.matrix[np.ix_(columns, columns)] / np.outer(size, size))
         kept = values > SEEN
         inverse = np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)
-        return vectors @ (inverse * (vectors.T @ (self.matrix[columns, -1] / size))) / size, int(kept.sum())
+        scaled = vectors / size[:, None]
+        return (scaled * inverse) @ scaled.T, int(kept.sum())
+
+    def likeness(self, signal: np.ndarray, columns: np.ndarray) -> float:
+        """Correlation of what the columns `signal` take of the residual with what `columns` can take of that."""
+        weights = self.weights(signal)[0]
+        energy = float(weights @ self.matrix[np.ix_(signal, signal)] @ weights)
+        target = self.matrix[columns][:, signal] @ weights
+        return float(np.sqrt(max(target @ self.inverse(columns)[0] @ target, 0.0) / energy)) if energy > 0 else 0.0
 
     def visibility(self, columns: np.ndarray) -> float:
         """RMS that survives the baseline over RMS before."""

@@ -28,7 +28,7 @@ class Fit:
     """A fitted model: the problem, the parameters p (P,) and covariance (P, P), and how well it does.
 
     rms_lsb over all residuals; heldout_rms_lsb over stretches fitted without them; unobservable: names of parameters
-    that this log cannot determine, which stay at their null.
+    that this log cannot determine, which stay at their null. held: names of parameters that were not to be fitted.
     """
 
     problem: Problem
@@ -40,6 +40,7 @@ class Fit:
     linear: Linear
     setups: dict[str, Setup] = field(default_factory=dict)
     extra: tuple[Effect, ...] = ()
+    held: frozenset[str] = frozenset()
 
     @property
     def model(self) -> Model:
@@ -51,7 +52,7 @@ class Fit:
 
     @property
     def unobservable(self) -> tuple[str, ...]:
-        return tuple(n for n, free in zip(self.model.names, self.free, strict=True) if not free)
+        return tuple(n for n, f in zip(self.model.names, self.free, strict=True) if not f and n not in self.held)
 
     @property
     def rms_lsb(self) -> float:
@@ -108,13 +109,16 @@ def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect
     return fit_problem(Problem(model, seen, magnitude), linear, known, tuple(extra), start_values(model, linear), tick)
 
 
-def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float]) -> Fit:
-    """The same log under the effects of `known`, from the parameters found so far and those of `start` (by name)."""
+def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float], hold: frozenset[str] = frozenset()) -> Fit:
+    """The same log under the effects of `known`, from the parameters found so far and those of `start` (by name).
+
+    Parameters of `hold` are not fitted, nor those that were held before.
+    """
     model = compose(tuple(known), known, fit.extra)
     values = dict(zip(fit.model.names, fit.p, strict=True)) | start
     p = np.array([values.get(name, first) for name, first in zip(model.names, model.first, strict=True)])
     p = np.clip(p, *model.bounds())
-    return fit_problem(replace(fit.problem, model=model), fit.linear, known, fit.extra, p)
+    return fit_problem(replace(fit.problem, model=model), fit.linear, known, fit.extra, p, held=fit.held | hold)
 
 
 def with_reference(seen: Observations, file: ModelFile) -> Observations:
@@ -170,14 +174,21 @@ def missing_columns(seen: Observations, effect: Effect) -> tuple[str, ...]:
 
 
 def fit_problem(
-    problem: Problem, linear: Linear, known: dict[str, Setup], extra: tuple[Effect, ...], p: np.ndarray, tick=None
+    problem: Problem,
+    linear: Linear,
+    known: dict[str, Setup],
+    extra: tuple[Effect, ...],
+    p: np.ndarray,
+    tick=None,
+    held: frozenset[str] = frozenset(),
 ) -> Fit:
     """Minimise from p, freezing what the log cannot determine, and leaving outliers out where the model says so."""
     if problem.n * problem.residuals_per_sample <= len(p):
         raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
     if problem.model.loss is None:
         problem = replace(problem, believed=None)
-    solution = _determined(problem, p, np.ones(len(p), bool), tick)
+    fitted = np.array([name not in held for name in problem.model.names])
+    solution = _determined(problem, p, fitted, tick)
     for _ in range(OUTLIER_PASSES if problem.model.loss else 0):
         believed = believable(problem.residual(solution.p))
         if problem.believed is not None and np.array_equal(believed, problem.believed):
@@ -185,7 +196,7 @@ def fit_problem(
         problem = replace(problem, believed=believed)
         solution = _determined(problem, solution.p, solution.free, tick)
     cov = observability.covariance(solution.gram, solution.free)
-    return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra)
+    return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra, held)
 
 
 def believable(residual: np.ndarray) -> np.ndarray:
