@@ -34,8 +34,10 @@ class Fitted:
 def from_calibration(calibration: Calibration) -> Fitted:
     """The fitted model of a calibration. Parameters it could not determine stay at their null.
 
-    Raises InputError if the parameters are not those of the effects it names.
+    Raises InputError if the parameters are not those of the effects it names, or no numbers to compute with: a
+    calibration file is text, and text is edited.
     """
+    _require_usable(calibration)
     extra = load_plugins(calibration.model.plugins)
     model, flipping = _same_parameters(calibration, extra)
     p = model.null.copy()
@@ -43,6 +45,21 @@ def from_calibration(calibration: Calibration) -> Fitted:
         if name in calibration.parameters:
             p[at] = calibration.parameters[name].value
     return Fitted(model, p, calibration.easy_axis, calibration.t0_c, flipping == "raw")
+
+
+def _require_usable(calibration: Calibration) -> None:
+    for name, found in calibration.parameters.items():
+        if not np.isfinite(found.value):
+            raise InputError(must(f"the calibration's {name}", "a finite number", found.value))
+    if not set(calibration.easy_axis) <= {0, 1, 2}:
+        raise InputError(must("the calibration's easy_axis", "one of 0, 1, 2 for each axis", calibration.easy_axis))
+    reference = calibration.selfcal
+    if reference and not (
+        np.all(np.isfinite(reference.gain_ut_per_unit)) and np.all(np.diag(reference.gain_ut_per_unit))
+    ):
+        raise InputError(must("selfcal.gain_ut_per_unit", "finite, with a response of each axis to its coil", "other"))
+    if reference and not (np.all(np.isfinite(reference.units_ma)) and np.all(reference.units_ma)):
+        raise InputError(must("selfcal.units_ma", "finite currents other than 0", reference.units_ma))
 
 
 def _same_parameters(calibration: Calibration, extra: tuple[Effect, ...]) -> tuple[Model, str]:

@@ -5,14 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from barberpole.board_log import SelfcalRun
 from barberpole.calibration import Calibration
+from barberpole.calibration_tables import SelfcalReference
 from barberpole.columns import CURRENT
 from barberpole.errors import InputError, must
-from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
+from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, require_columns
 from barberpole.fit.residual import Problem
 from barberpole.fitted import Fitted, from_calibration
 from barberpole.log import Log
 from barberpole.observations import Observations, observations
+from barberpole.plugins import load_plugins
 from barberpole.reasons import sentence
 from barberpole.selfcal import SelfcalResult, recompute
 
@@ -55,6 +58,11 @@ def verify(log: Log, calibration: Calibration) -> Verification:
     checks = [*_identity(log, calibration), *_selfcal(log, calibration, fitted)]
     if not _coils_driven(log):
         checks += _readings(log, calibration, fitted)
+    if not checks:
+        got = "a coil run without its verdict"
+        raise InputError(
+            must("the log", "one with readings at rest, or a board's own record of a power-up", got, log.path)
+        )
     return Verification(tuple(checks))
 
 
@@ -83,8 +91,15 @@ def _selfcal(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Che
         {"selfcal_accepted": accepted, "selfcal_reasons": codes, "in_force": result.get("in_force")},
     )
     if log.selfcal is not None and calibration.selfcal is not None:
-        again = recompute(log.selfcal, fitted, np.asarray(calibration.selfcal.gain_ut_per_unit))
+        again = recompute(log.selfcal, fitted, _factory_response(log.selfcal, calibration.selfcal))
         yield from _gains(result, again)
+
+
+def _factory_response(run: SelfcalRun, reference: SelfcalReference) -> np.ndarray:
+    """(3, 3) µT per unit of this run's currents, which need not be the factory's."""
+    response = np.asarray(reference.gain_ut_per_unit)
+    today_ma = run.header.get("unit_ma")
+    return response if today_ma is None else response * (np.asarray(today_ma) / np.asarray(reference.units_ma))
 
 
 def _gains(result: dict, again: SelfcalResult) -> Iterator[Check]:
@@ -113,6 +128,7 @@ def _coils_driven(log: Log) -> bool:
 
 def _readings(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Check]:
     seen = _with_sensor(observations(log), fitted, log)
+    require_columns(seen, fitted.model.effects, load_plugins(calibration.model.plugins))
     magnitude = float(calibration.model.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     problem = Problem(fitted.model, seen, magnitude)
     if problem.vector:
