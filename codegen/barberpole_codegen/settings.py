@@ -6,11 +6,13 @@ import math
 import numpy as np
 from barberpole.board import Board
 from barberpole.calibration import Calibration
+from barberpole.errors import LimitError, must
 from barberpole.fitted import from_calibration
 from barberpole.selfcal import slope_lsb_per_ut
 from barberpole.trajectory import CodeTable
 
 from barberpole_codegen.emit import Constant, literal
+from barberpole_codegen.narrow import narrow_number
 
 SUPPLY_FRACTION = 0.95  # below this the pulse is weaker than the board was designed for
 WIDE_DRIFT = 0.5  # without a factory reference gains are compared with nominal parts only
@@ -20,6 +22,10 @@ CURVATURE = 3  # the lowest odd power a bridge's law can miss
 FIRST_RATIO = 128  # oversampling ratio of code 0; each code doubles it
 MODULATOR_HZ = 4096000  # of the ADS131M08 at 8.192 MHz
 OWN_OFFSET = ("bias.bridge_", "flip_asymmetry.offset_")  # parameters that are the electronic offset
+LAST_RATIO_CODE = 6  # the next is 16256, not a power of two
+LARGEST_GAIN = 128
+FRAME_BITS = 240  # status, eight channels and check sum of 24 bits
+MOST_SUMMED = 255
 T0_C = 25.0  # at which the sensor file gives the bridge resistance
 
 
@@ -112,8 +118,8 @@ def digest(constants: list[Constant]) -> str:
 
 
 def narrowed(values) -> tuple[float, ...]:
-    """As float32 holds them."""
-    return tuple(float(np.float32(v)) for v in values)
+    """As float32 holds them. Raises InputError for what it cannot hold."""
+    return tuple(narrow_number(float(v)) for v in values)
 
 
 def _names(board: Board) -> list[Constant]:
@@ -143,7 +149,8 @@ def _adc(board: Board) -> list[Constant]:
     c = adc.channels
     channels = (c.x, c.y, c.z, c.bridge, c.coil_x, c.coil_y, c.coil_z, c.supply)
     gain1, gain2 = _gain_registers(adc.pga, channels[:3])
-    ratio = round(math.log2(MODULATOR_HZ / adc.sample_hz / FIRST_RATIO))
+    ratio = _ratio_code(adc.sample_hz)
+    _require_frame_time(adc.baud, adc.sample_hz)
     per_lsb = {
         "TEMP_AT_0_C": (T0_C - c_per_v * bridge_v, "bridge temperature for a code of 0"),
         "TEMP_C_PER_LSB": (c_per_v / lsb_per_v, "the bridge's resistance at a constant current is the thermometer"),
@@ -170,8 +177,27 @@ def _adc(board: Board) -> list[Constant]:
 def _gain_registers(pga: int, bridges: tuple[int, ...]) -> tuple[int, int]:
     """GAIN1 and GAIN2: four channels each, four bits a channel, the code is log2 of the gain; gain 1 elsewhere."""
     code = pga.bit_length() - 1
+    if pga != 1 << code or pga > LARGEST_GAIN:
+        raise LimitError(must("adc.pga", f"a power of two up to {LARGEST_GAIN}, as the ads131m08 has them", pga))
     both = sum(code << (4 * channel) for channel in bridges)
     return both & 0xFFFF, both >> 16
+
+
+def _ratio_code(sample_hz: float) -> int:
+    """CLOCK.OSR: the power of two by which the oversampling ratio exceeds the smallest."""
+    ratio = MODULATOR_HZ / FIRST_RATIO / sample_hz
+    code = round(math.log2(ratio))
+    if ratio != 2.0**code or not 0 <= code <= LAST_RATIO_CODE:
+        rates = ", ".join(f"{MODULATOR_HZ / FIRST_RATIO / 2**k:g}" for k in range(LAST_RATIO_CODE + 1))
+        raise LimitError(must("adc.sample_hz", f"a rate of the ads131m08 ({rates})", f"{sample_hz:g}"))
+    return code
+
+
+def _require_frame_time(baud: int, sample_hz: float) -> None:
+    """A frame must be read before the next conversion, or conversions are lost."""
+    needed = FRAME_BITS * sample_hz
+    if baud < needed:
+        raise LimitError(must("adc.baud", f"at least {needed:g} bit/s ({FRAME_BITS} bits a conversion)", f"{baud}"))
 
 
 def _dac(board: Board) -> list[Constant]:
@@ -188,6 +214,10 @@ def _dac(board: Board) -> list[Constant]:
 
 def _selfcal(board: Board) -> list[Constant]:
     run = board.selfcal
+    summed = run.cycles_per_point * board.adc.samples_per_half
+    if summed > MOST_SUMMED:
+        what = "selfcal.cycles_per_point times adc.samples_per_half"
+        raise LimitError(must(what, f"at most {MOST_SUMMED} (sums of 24-bit codes are kept in 32 bits)", summed))
     return [
         Constant("SETTLE_CYCLES", run.settle_cycles, "dropped after each new current"),
         Constant("CYCLES_PER_POINT", run.cycles_per_point),

@@ -55,6 +55,29 @@ def test_nothing_half_written_on_error(board, calibration, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("table", "change", "says"),
+    [
+        ("adc", {"pga": 3}, "a power of two"),
+        ("adc", {"sample_hz": 7000.0}, "a rate of the ads131m08"),
+        ("adc", {"baud": 1000000}, "at least 1.92e"),
+        ("selfcal", {"cycles_per_point": 32}, "at most 255"),
+    ],
+)
+def test_what_the_parts_cannot_do_is_refused(board, calibration, tmp_path, table, change, says):
+    asked = replace(board, **{table: replace(getattr(board, table), **change)})
+    with pytest.raises(LimitError, match=says):
+        build(asked, calibration, tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_limit_without_bound_is_refused(board, calibration, tmp_path):
+    """A residual edited to infinity would be a limit that no run exceeds, and no number in MicroPython."""
+    residual = replace(calibration.residual, rms_lsb=float("inf"))
+    with pytest.raises(InputError, match="inf"):
+        build(board, replace(calibration, residual=residual), tmp_path / "out")
+
+
 def test_a_model_that_cannot_be_undone_is_refused(board, calibration, tmp_path):
     steep = {
         name: replace(value, value=6e-3) if name.startswith("cross_field") else value
