@@ -1,7 +1,8 @@
 # bp_records.py: what the board says, as frames that a reader can trust one by one.
 # A frame is one line of text: "$", then base64 of type (1 byte), sequence (uint16), payload, and CRC-16 over the
 # three, all little-endian. A damaged frame fails its check sum and is dropped by the reader; a lost one leaves a gap
-# in the sequence. The header frame names the columns, so a log explains itself.
+# in the sequence. The header frame names the columns, so a log explains itself. It begins a power-up with sequence 0
+# and is repeated now and then for readers that join later: any other sequence says that the power-up goes on.
 import binascii
 import json
 import struct

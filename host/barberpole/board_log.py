@@ -7,7 +7,7 @@ import numpy as np
 
 from barberpole.columns import CURRENT, RESET, SET, check_names
 from barberpole.errors import InputError, must
-from barberpole.records import EVENT, FORMAT, HEADER, POINT, POINTS, RESULT, ROWS, RUN, TYPES, Frame, decode
+from barberpole.records import EVENT, FORMAT, HEADER, POINT, POINTS, RESULT, ROWS, RUN, SEQUENCES, TYPES, Frame, decode
 
 CODES = {"b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8", "f": "<f4", "d": "<f8"}
 
@@ -91,20 +91,43 @@ def _damage(damaged: int, lost: int) -> list[str]:
 def _last_power_up(frames: tuple[Frame, ...], where: object) -> tuple[_PowerUp, int, int]:
     """The last power-up with rows or points, frames before any header, and frames of earlier power-ups."""
     power_ups: list[_PowerUp] = []
-    orphans = 0
+    early: list[Frame] = []
+    last = None
     for frame in frames:
-        if frame.type == HEADER:
+        if frame.type != HEADER:
+            (power_ups[-1].of[frame.type] if power_ups else early).append(frame)
+        elif not (power_ups and last and _goes_on(power_ups[-1].header, frame, last)):
             power_ups.append(_PowerUp(_checked_header(frame.json or {}, where)))
-        elif power_ups:
-            power_ups[-1].of[frame.type].append(frame)
-        else:
-            orphans += 1
+            if len(power_ups) == 1 and frame.sequence:
+                for heard in (joined := _of_one_power_up(early, frame)):
+                    power_ups[0].of[heard.type].append(heard)
+                del early[len(early) - len(joined) :]
+        last = frame
+    orphans = len(early)
     telling = [p for p in power_ups if p.of[ROWS] or p.of[POINTS]]
     if not telling:
         found = "no header" if not power_ups else "neither rows nor points"
         raise InputError(must("the board record", "framed lines: a header, then rows or points", found, where))
     earlier = sum(len(kind) for p in telling[:-1] for kind in p.of.values())
     return telling[-1], orphans, earlier
+
+
+def _goes_on(header: dict[str, Any], frame: Frame, last: Frame) -> bool:
+    """Whether this header frame only repeats what began the power-up."""
+    again = frame.json or {}
+    same = "boot" in header and (header["boot"], header.get("uid")) == (again.get("boot"), again.get("uid"))
+    return same and (frame.sequence != 0 or last.sequence == SEQUENCES - 1)
+
+
+def _of_one_power_up(early: list[Frame], header: Frame) -> list[Frame]:
+    """Of the frames before the first header, a repeated one, those of its power-up: where the sequence goes back,
+    another ended."""
+    later = header.sequence
+    for at in range(len(early) - 1, -1, -1):
+        if (later - early[at].sequence) % SEQUENCES > SEQUENCES // 2:
+            return early[at + 1 :]
+        later = early[at].sequence
+    return early[:]
 
 
 def _checked_header(header: dict[str, Any], where: object) -> dict[str, Any]:

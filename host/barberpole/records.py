@@ -115,12 +115,18 @@ class Decoder:
         return frames
 
     def _counted(self, frame: Frame) -> Frame:
-        if self._expected is not None and frame.type != HEADER:  # a header begins a power-up, which counts afresh
+        if self._expected is not None and not begins_power_up(frame):  # which counts afresh
             gap = (frame.sequence - self._expected) % SEQUENCES
-            self.lost += max(0, gap - self._unexplained)
+            if gap < SEQUENCES // 2:  # it went back: a power-up whose header is damaged
+                self.lost += max(0, gap - self._unexplained)
         self._expected = (frame.sequence + 1) % SEQUENCES
         self._unexplained = 0
         return frame
+
+
+def begins_power_up(frame: Frame) -> bool:
+    """Whether this is the header of a power-up, and not one repeated for readers that join later."""
+    return frame.type == HEADER and frame.sequence == 0
 
 
 def parse(line: bytes) -> Frame | None:

@@ -231,6 +231,44 @@ def test_only_the_last_power_up_counts(tmp_path):
     assert log.notes == ("8 frames of earlier power-ups were left out",)
 
 
+def streamed(first: int, rows: int, boot: int = 7) -> list[bytes]:
+    """Rows from sequence `first` on, every fifth frame the header again."""
+    head = {**HEADER, "uid": "ab12", "boot": boot}
+    kinds = [encode_json("H", k, head) if k % 5 == 0 else encode("D", k, row(k)) for k in range(first, first + rows)]
+    return list(kinds)
+
+
+def test_a_repeated_header_is_the_same_power_up(tmp_path):
+    log = read_log(csv(tmp_path, b"".join(streamed(0, 20)), "log.bpr"))
+    assert (log.n, log.skipped, log.notes) == (16, 0, ())
+    lost = streamed(0, 20)
+    del lost[9:12]  # the header between two rows, and the rows
+    log = read_log(csv(tmp_path, b"".join(lost), "log.bpr"))
+    assert (log.n, log.notes) == (14, ("3 records are missing from the sequence",))
+
+
+def test_a_reader_that_joins_later_loses_nothing_of_that_power_up(tmp_path):
+    log = read_log(csv(tmp_path, b"".join(streamed(23, 20)), "log.bpr"))
+    assert (log.n, log.skipped, log.notes) == (16, 0, ())
+    assert log.meta["boot"] == 7
+    wraps = streamed(65534, 20)  # the sequence is 16 bits
+    assert read_log(csv(tmp_path, b"".join(wraps), "log.bpr")).n == 16
+
+
+def test_rows_of_the_power_up_before_are_not_taken_for_this_one(tmp_path):
+    """Both first headers are gone: the sequence that goes back is all that tells them apart."""
+    log = read_log(csv(tmp_path, b"".join([*streamed(31, 3, boot=6), *streamed(1, 9)]), "log.bpr"))
+    assert (log.n, log.skipped) == (8, 3)
+    assert "3 frames before the first header" in log.notes[-1]
+
+
+def test_the_same_boot_number_again_is_another_power_up(tmp_path):
+    """A board whose flash is full counts no further."""
+    log = read_log(csv(tmp_path, b"".join([*streamed(0, 20), *streamed(0, 10)]), "log.bpr"))
+    assert log.n == 8
+    assert log.notes == ("16 frames of earlier power-ups were left out",)
+
+
 def test_points_stand_in_for_rows(tmp_path):
     log = read_log(csv(tmp_path, b"".join(board_record()[:5]), "log.bpr"))
     assert log.n == 2

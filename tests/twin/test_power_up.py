@@ -10,6 +10,7 @@ from barberpole.calibrating import calibration_of, with_selfcal
 from barberpole.demo.bench import TRUE_EFFECTS, Bench, scale_at_reference
 from barberpole.fit.fit import fit_observations
 from barberpole.link.deploy import pull
+from barberpole.link.record import record
 from barberpole.log import read_log
 from barberpole.modelfile import ModelFile
 from barberpole.nominal import nominal
@@ -99,6 +100,18 @@ def test_board_in_float32_and_host_in_double_agree_on_the_same_points(board, cal
     found = verify(read_log(tmp_path / "run.bpr"), calibration)
     assert found.passed, found.to_json()
     assert found.to_json()["board_against_host_ppm"] < 10.0
+
+
+def test_a_host_that_joins_later_reads_the_stream(board, calibration, tmp_path):
+    """Header and verdict are said again: what runs, which gains are in force, and what the columns are."""
+    result = power_up(board, seed=4)
+    record(board.port, tmp_path / "late.bpr", frames=600)
+    log = read_log(tmp_path / "late.bpr")
+    assert log.n > 590
+    assert log.skipped <= 1  # the line in which it joined
+    assert log.meta["calibration"] == calibration.hash
+    assert log.meta["result"]["in_force_gain"] == result["in_force_gain"]
+    assert verify(log, calibration).to_json()["running"] == calibration.hash
 
 
 @pytest.mark.parametrize("fault", REASON)
