@@ -26,6 +26,7 @@ import bp_reasons as reasons
 from bp_givens import Givens
 from bp_points import Points
 
+_HUGE = 1e30
 _LOOKS = const(3)  # at the first block, before the whole run
 
 
@@ -134,6 +135,13 @@ class _Fit:  # equation (1) over the first points, read at this gain and offset
         return max([max([m[i] for m in means]) - min([m[i] for m in means]) for i in range(3)]) if means else 0.0
 
 
+def _in_numbers(solution):  # nan and inf, where float32 ran over, are below no bound: judge() would let nan pass
+    found = solution.gain + solution.ambient_ut + solution.residual_ut + solution.offset_lsb
+    if not sum([abs(value) for value in found]) < _HUGE:
+        raise ValueError
+    return solution
+
+
 def current_ratio(points, trajectory):  # current read back over current asked for, by axis
     ratios = []
     for i in range(3):
@@ -192,7 +200,7 @@ def run(sampler, coils, compensator, trajectory, calibration, board):
     begin_ms = time.ticks_ms()
     try:
         measure(result.points, sampler, coils, compensator, trajectory, board)
-        result.solution = solve(result.points, calibration, trajectory, calibration.GAIN_DRIFT_LIMIT)
+        result.solution = _in_numbers(solve(result.points, calibration, trajectory, calibration.GAIN_DRIFT_LIMIT))
         result.current_ratio = current_ratio(result.points, trajectory)
         result.offset_lsb = offset_lsb(result.points)
         result.reasons = judge(result.solution, result.current_ratio, calibration, board)

@@ -134,6 +134,25 @@ def test_board_refuses_an_open_coil(on_board, fitted, table):
     assert on_board(run)[5][0] == 5
 
 
+NO_NUMBERS = """
+import json
+import bp_board, bp_calibration, bp_selfcal, bp_trajectory
+def measure(points, *_):
+    for k in range(bp_trajectory.POINTS):
+        reading = float(%r) if k == 40 else 1e5
+        points.put((k %% 2, k %% 3, k %% 5), [reading] * 6, (3.0, 3.0, 3.0), 25.0)
+bp_selfcal.measure = measure
+result = bp_selfcal.run(None, None, None, bp_trajectory, bp_calibration, bp_board)
+print(json.dumps([result.reasons, result.solution is None, result.accepted]))
+"""
+
+
+@pytest.mark.parametrize("reading", ["nan", "inf"])
+def test_what_is_no_number_is_never_accepted(micropython, build_with, reference, reading):
+    """No comparison with nan holds, so it would exceed no limit."""
+    assert json.loads(micropython(NO_NUMBERS % reading, build_with(reference) / "src")) == [[15], True, False]
+
+
 def test_all_of_it_in_float32(firmware_float32, fitted, table, reference, build_with):
     """undo_coil and the rotations with every operation rounded to float32, as on the STM32F4, against double."""
     namespace: dict = {"sqrt": np.sqrt}
