@@ -20,7 +20,7 @@ def board_reference() -> str:
     """Markdown: one table of keys for each TOML table."""
     parts = [INTRODUCTION, "## Boards\n"]
     parts += [_keys(name, kind) for name, kind in _tables("board", Board)]
-    parts += ["## Sensors\n", _keys("sensor", Sensor)]
+    parts += ["## Sensors\n", *(_keys(name, kind) for name, kind in _tables("sensor", Sensor))]
     return "\n".join(parts)
 
 

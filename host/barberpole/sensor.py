@@ -7,11 +7,44 @@ from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
-from barberpole.tables import STRICT, NotNegative, Number, Positive
+from barberpole.tables import STRICT, Count, NotNegative, Number, Positive
 
 Axis = Literal["x", "y", "z"]
 Axes = tuple[Axis, Axis, Axis]
 PerAxis = tuple[Positive, Positive, Positive]
+
+
+Pair = tuple[Number, Number]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Digital:
+    """A sensor with its converter on the chip, as calibrated at its finest range (form of the article's table 1)."""
+
+    rate_hz: Positive
+    """Hz. Rate of the readings."""
+    sensitivity_nt_per_lsb: PerAxis
+    """nT/LSB. Mean linear sensitivity."""
+    sensitivity_range_nt_per_lsb: tuple[NotNegative, NotNegative, NotNegative]
+    """nT/LSB. Half the range of the sensitivity over sensors of the kind."""
+    misalignment_deg: tuple[NotNegative, NotNegative]
+    """°. Angle between axes less 90°: median and maximum over sensors."""
+    noise_nt: PerAxis
+    """nT. Mean standard deviation of the noise."""
+    noise_at_1_hz_nt_per_rthz: PerAxis
+    """nT/√Hz. Mean noise density at 1 Hz."""
+    offset_nt: Pair
+    """nT. Smallest and largest offset over axes and sensors."""
+    sensitivity_drift_25c_pt_per_lsb_per_c: Pair
+    """pT/LSB/°C. Drift of the sensitivity at 25 °C: middle and half the range."""
+    sensitivity_drift_formula: Pair
+    """pT/LSB/°C. The mean drift is first x T + second, T in °C."""
+    offset_drift_nt_per_c: Pair
+    """nT/°C. Drift of the offset: middle and half the range."""
+    offset_drift_max_nt_per_c: Positive
+    """nT/°C. Largest magnitude of the drift of the offset."""
+    polynomial_degrees: tuple[Count, Count]
+    """Degrees m (on-axis) and n (cross-field) that sufficed for the polynomial calibration."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -58,6 +91,8 @@ class Sensor:
     """A. Smallest pulse that aligns all domains."""
     strap_pulse_us_min: Positive
     """µs. Shortest pulse that aligns all domains."""
+    digital: Digital | None = None
+    """Figures of a sensor with its converter on the chip."""
 
     @property
     def easy_axis_index(self) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""characterise: the data sheet of one sensor from its logs."""
+"""characterise: the data sheet of one sensor from its logs; simulate: logs of a sensor that a file describes."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,15 +7,26 @@ import numpy as np
 import typer
 
 from barberpole import __version__
+from barberpole.board import load_sensor
 from barberpole.characterise.page import uncertain, write_sheet
 from barberpole.characterise.sheet import Sheet, make_sheet
+from barberpole.characterise.simulate import readings
+from barberpole.columns import FIELD, READINGS
 from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
-from barberpole.log import read_log
+from barberpole.errors import InputError, must
+from barberpole.log import Log, read_log, write_log
+from barberpole.sensor import Sensor
+from barberpole.trajectory.programs import FREQUENCIES_HZ, SINE_PEAK_TO_PEAK_UT, lin_60000
+
+PROGRAMS = ("linearity", "rest", "sine")
+REPEATS = 25  # readings of each field of the linearity program
+REST_S, TONE_S = 300.0, 60.0  # article 2.4: five minutes of noise; long enough for the slowest sine
 
 
 def register(app: typer.Typer) -> None:
-    """Add this command to the roof."""
+    """Add these commands to the roof."""
     app.command()(characterise)
+    app.command()(simulate)
 
 
 def characterise(
@@ -55,3 +66,43 @@ def _json(sheet: Sheet) -> dict:
         for f in sheet.figures
     ]
     return {"figures": rows, "notes": list(sheet.notes)}
+
+
+def simulate(
+    sensor: Annotated[str, typer.Argument(help="Sensor name or .toml with a table [sensor.digital].")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Log to write (.csv or .parquet).")],
+    program: Annotated[str, typer.Option(help=f"One of {', '.join(PROGRAMS)} (article 2.4).")] = "linearity",
+    temp: Annotated[float, typer.Option(help="Temperature in °C.")] = 25.0,
+    seed: Annotated[int, typer.Option(help="Which sensor of the kind.")] = 0,
+    as_json: bool = AS_JSON,
+) -> None:
+    """A log as a digital sensor of this kind would write it under a field program of the article."""
+    kind = load_sensor(sensor)
+    log = _simulated(kind, program, temp, seed, output)
+    write_log(log, output)
+    if as_json:
+        print_json({"sensor": kind.name, "program": program, "n": log.n, "log": str(output)})
+    else:
+        OUT.print(f"{log.n} readings of a {kind.name} ({program}) written to {output}")
+
+
+def _simulated(kind: Sensor, program: str, temp_c: float, seed: int, path: Path) -> Log:
+    rate_hz = kind.digital.rate_hz if kind.digital else 1.0
+    if program not in PROGRAMS:
+        raise InputError(must("the program", f"one of {', '.join(PROGRAMS)}", repr(program)))
+    extra: dict[str, np.ndarray] = {}
+    if program == "linearity":
+        field = np.repeat(lin_60000().field_ut, REPEATS, axis=0).T
+        extra = dict(zip(FIELD, field, strict=True))
+    elif program == "rest":
+        field = np.zeros((3, round(REST_S * rate_hz)))
+    else:
+        t = np.arange(round(TONE_S * rate_hz)) / rate_hz
+        half = 0.5 * SINE_PEAK_TO_PEAK_UT / np.sqrt(3.0)  # the sensor is slanted: all axes see the same
+        wave = np.concatenate([half * np.sin(2.0 * np.pi * f * t) for f in FREQUENCIES_HZ])
+        field = np.tile(wave, (3, 1))
+        extra = {"f_hz": np.repeat(FREQUENCIES_HZ, len(t))}
+    y = readings(kind, field, temp_c, seed)
+    n = y.shape[1]
+    columns = {"t_s": np.arange(n) / rate_hz, **dict(zip(READINGS, y, strict=True)), "temp_c": np.full(n, temp_c)}
+    return Log(columns | extra, path, "")

@@ -40,7 +40,8 @@ def turn_over(reading: np.ndarray, turn: np.ndarray) -> TurnOver:
         normal, turned = _positions(reading[axis], turn, axis)
         offset[axis] = 0.5 * (normal.mean() + turned.mean())
         residual[axis] = 0.5 * (normal.mean() - turned.mean())
-        stderr[axis] = 0.5 * np.sqrt(normal.var(ddof=1) / normal.size + turned.var(ddof=1) / turned.size)
+        white = 0.5 * np.sqrt(normal.var(ddof=1) / normal.size + turned.var(ddof=1) / turned.size)
+        stderr[axis] = max(white, _between(reading[axis], turn, axis))
     return TurnOver(offset, residual, stderr)
 
 
@@ -51,6 +52,18 @@ def _positions(values: np.ndarray, turn: np.ndarray, axis: int) -> tuple[np.ndar
         got = f"{np.sum(as_is)} and {np.sum(~as_is)} on {'xyz'[axis]}"
         raise InputError(must(WHAT, f"given at least {LEAST_ROWS} rows with the axis either way", got))
     return values[as_is], values[~as_is]
+
+
+def _between(values: np.ndarray, turn: np.ndarray, axis: int) -> float:
+    """Standard error from what positions that should agree differ by, for slow noise does not show in one; or 0."""
+    means = {k: float(values[turn == k].mean()) for k in (0, 1, 2, 3) if np.any(turn == k)}
+    as_is = [m for k, m in means.items() if k in (0, axis + 1)]
+    reversed_ = [m for k, m in means.items() if k not in (0, axis + 1)]
+    free = len(means) - 2
+    if free < 1:
+        return 0.0
+    left = sum(len(g) * float(np.var(g)) for g in (as_is, reversed_))
+    return float(0.5 * np.sqrt(left / free * (1.0 / len(as_is) + 1.0 / len(reversed_))))
 
 
 def turn_over_log(log: Log, given: Given) -> Answer:

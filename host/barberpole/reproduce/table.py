@@ -4,10 +4,10 @@ from pathlib import Path
 from types import ModuleType
 
 from barberpole.files import write_atomic
-from barberpole.reproduce import thesis_apparatus, thesis_calibration, thesis_electronics, thesis_law
+from barberpole.reproduce import article, thesis_apparatus, thesis_calibration, thesis_electronics, thesis_law
 from barberpole.reproduce.row import Row
 
-MODULES: tuple[ModuleType, ...] = (thesis_law, thesis_electronics, thesis_calibration, thesis_apparatus)
+MODULES: tuple[ModuleType, ...] = (thesis_law, thesis_electronics, thesis_calibration, thesis_apparatus, article)
 """In the order of the page."""
 
 INTRODUCTION = """# Published figures, reproduced
