@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: demo test lint bench docs reproduce clean
+.PHONY: trials demo test lint bench docs reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo
@@ -23,6 +23,10 @@ lint: $(STAMP) $(STUBS)/.installed
 
 bench: $(STAMP)
 	@$(BIN)/python -m pytest -m bench -s
+
+# A few hundred logs of an independent truth: what is named, what is missed, what is alarmed falsely.
+trials: $(STAMP)
+	@PYTHONPATH=tests $(BIN)/python -m truth.trials
 
 docs: $(STAMP)
 	@$(BIN)/python -m barberpole.docs host/docs
