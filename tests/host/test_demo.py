@@ -2,8 +2,10 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
+from barberpole.calibration import read_calibration
 from barberpole.cli import run
 
 KEYS = {
@@ -27,6 +29,20 @@ def test_the_hidden_effect_is_named_and_the_error_falls_to_the_noise(hidden, tmp
     page = (tmp_path / "demo.html").read_text()
     assert f"{got['heldout_before_lsb']:.1f} to {got['heldout_after_lsb']:.1f} LSB" in page
     assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", page)  # opens offline
+
+
+def test_the_worked_example_runs_on_what_the_demo_leaves(tmp_path, capsys, monkeypatch):
+    """Every command of the README that needs no board, letter by letter."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["demo", "-o", "demo"]) == 0
+    text = (Path(__file__).parents[2] / "README.md").read_text()
+    listed = re.findall(r"^    barberpole (.*?)(?:  +#.*)?$", text, re.MULTILINE)
+    told = [line for line in listed if "demo/" in line or line.startswith("build")]
+    assert len(told) == 6
+    for line in told:
+        assert run(line.split()) == 0, capsys.readouterr().err
+    assert "cross_field" in Path("demo/model-1.toml").read_text()
+    assert read_calibration(Path("calibration.toml")).selfcal is not None
 
 
 def test_with_nothing_hidden_it_says_so(tmp_path, capsys):

@@ -126,7 +126,7 @@ class Story:
 
     def _first_model(self, bench: Bench) -> ModelFile:
         kept = ("bias", "scale", *(name for name in TRUE_EFFECTS if name != self.hidden))
-        path = self.folder / "model.toml"
+        path = self.folder / "model-1.toml"
         write_model(ModelFile(kept, sensor=bench.board.sensor.name), path)
         return read_model(path)
 
@@ -162,11 +162,10 @@ class Story:
 
     def _add(self, bench: Bench, factory: Session, before: Believed, effect: str) -> tuple[Change, Calibration]:
         """What `barberpole add` does, then the factory log once more under the larger model."""
-        path = self.folder / "model.toml"
-        old = read_model(path)
+        old = read_model(self.folder / "model-1.toml")
         seen = observations(before.session.log, bench.board.sensor)
         found = change(seen, old, add_effect(old, effect), effect)
-        write_model(found.after_file, path)
+        write_model(found.after_file, self.folder / "model-2.toml")
         second = self._calibrate(bench, factory, found.after_file, "calibration-2.toml", before.calibration.history)
         return found, second
 
