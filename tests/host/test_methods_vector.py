@@ -169,6 +169,8 @@ def test_offset_coil_on_a_log(tmp_path):
     assert values["Sc_sigma_c.11"].value == pytest.approx(M[0, 0] * 15.0, rel=1e-3)
     with pytest.raises(InputError, match="coil currents"):
         run("offset_coil", make_log(y))
+    with pytest.raises(InputError, match="follow the coil currents"):
+        run("offset_coil", make_log(readings(field), **currents))
     with pytest.raises(InputError, match="all three coils"):
         run("offset_coil", make_log(y, **(currents | {"iz_ma": np.zeros(n)})))
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.errors import InputError
+from barberpole.errors import InputError, must
 from barberpole.fit.start import Linear
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
@@ -24,6 +24,7 @@ from barberpole.modelfile import ModelFile
 WHAT = "the linear method"
 PARAMETERS = 4  # of one axis: a row of M and a component of B_off
 PAIRS = ((0, 1), (0, 2), (1, 2))
+UNFOLLOWED = 0.5  # part of the field's variance that the readings may leave; a working sensor leaves 1e-4
 STEP = 1e-7  # relative, of the numerical derivatives of angles by elements of M
 
 
@@ -87,9 +88,18 @@ def linear(log: Log, given: Given) -> Answer:
     """The method on a log with an applied field. Raises InputError where the field is not known or does not span."""
     seen, field_ut = vector(log, WHAT, PARAMETERS)
     found = linear_model(seen.y, field_ut)
+    require_followed(found, seen.y, field_ut, "the applied field", log.path)
     to_reading = Linear(np.linalg.inv(found.matrix), found.offset_lsb, float(np.max(np.abs(field_ut))))
     fit = judged(to_reading, seen)
     return Answer(linear_values(found), fit, ModelFile(LINEAR_EFFECTS, reference=given.reference))
+
+
+def require_followed(found: LinearModel, reading: np.ndarray, field_ut: np.ndarray, what: str, where: object) -> None:
+    """Raise InputError where the readings do not account for most of the field's variance on every axis."""
+    left = np.var(found.field(reading) - field_ut, axis=1) / np.var(field_ut, axis=1)
+    if np.max(left) > UNFOLLOWED:
+        got = f"{100 * np.max(left):.0f} % of {'xyz'[int(np.argmax(left))]} not followed"
+        raise InputError(must("the readings", f"such as follow {what}", got, where))
 
 
 def linear_values(found: LinearModel) -> Values:

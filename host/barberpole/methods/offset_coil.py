@@ -19,7 +19,7 @@ from barberpole.errors import InputError, must
 from barberpole.fitted import from_calibration
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
-from barberpole.methods.linear import linear_model
+from barberpole.methods.linear import linear_model, require_followed
 from barberpole.methods.readings import demodulated
 
 WHAT = "the offset-coil method"
@@ -62,7 +62,9 @@ def offset_coil(log: Log, given: Given) -> Answer:
     if not size[2] > FLAT**2 * size[0]:
         raise InputError(must(WHAT, "given currents in all three coils", "fewer coils driven", log.path))
     ut_per_ma = given.sensor.offset_coil_ut_per_ma if given.sensor else NOMINAL_UT_PER_MA
-    found = linear_model(seen.y, ut_per_ma * seen.at.i_ma)
+    coil_ut = ut_per_ma * seen.at.i_ma
+    found = linear_model(seen.y, coil_ut)
+    require_followed(found, seen.y, coil_ut, "the coil currents", log.path)
     coil = Affine(found.matrix, -found.matrix @ found.offset_lsb)
     values = matrix_values("A", coil.a, _stderr(found.covariance)[:, :3], "uT/LSB")
     values |= per_axis("B", coil.b, _stderr(found.covariance)[:, 3], "uT")
