@@ -1,5 +1,8 @@
 """The command line: exit 0 done, 1 the answer is "no", 2 bad input with one clear sentence on stderr."""
 
+import barberpole.commands.interrupt as interrupt  # first: it stands for the time in which the others load
+
+# isort: split
 import sys
 import warnings
 
@@ -9,6 +12,8 @@ import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, 
 from barberpole import __version__
 from barberpole.commands import board, calibrate, catalogue, characterise, demo, design, methods, trajectory
 from barberpole.errors import BarberpoleError, must
+
+interrupt.loaded()
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -41,7 +46,9 @@ def _top(
 
 def main(arguments: list[str] | None = None) -> None:
     """Run one command and exit with its code."""
-    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+    code = run(sys.argv[1:] if arguments is None else arguments)
+    interrupt.done()
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:

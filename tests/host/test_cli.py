@@ -2,6 +2,10 @@
 
 import json
 import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -264,3 +268,13 @@ def test_help_alone_is_no_complaint(call):
     assert code == 2
     assert "calibrate" in out.lower()
     assert not err
+
+
+@pytest.mark.parametrize("after_s", [0.15, 0.4, 0.8, 1.2])
+def test_ctrl_c_while_it_loads_is_silent(after_s):
+    words = [sys.executable, "-m", "barberpole", "effects"]
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(after_s)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60)
+    assert "host/barberpole" not in err  # a traceback names its files; early on it may be the interpreter's own

@@ -56,8 +56,12 @@ def test_ctrl_c_keeps_what_was_recorded(cable, says, tmp_path):
             raise KeyboardInterrupt
 
     ticks = []
-    assert record(cable[1], tmp_path / "log.bpr", start=says(9), tick=tick) == 3
+    assert record(cable[1], tmp_path / "log.bpr", start=says(9), tick=tick, stoppable=True) == 3
     assert len(decode((tmp_path / "log.bpr").read_bytes()).frames) == 3
+    ticks.clear()
+    with pytest.raises(KeyboardInterrupt):  # what records for a purpose of its own, as the demo does, is ended by it
+        record(cable[1], tmp_path / "other.bpr", start=says(9), tick=tick)
+    assert names(tmp_path) == ["log.bpr"]
 
 
 def test_ctrl_c_before_the_first_frame_leaves_nothing(cable, tmp_path):
@@ -65,7 +69,7 @@ def test_ctrl_c_before_the_first_frame_leaves_nothing(cable, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        record(cable[1], tmp_path / "log.bpr", start=start)
+        record(cable[1], tmp_path / "log.bpr", start=start, stoppable=True)
     assert not names(tmp_path)
 
 

@@ -75,7 +75,7 @@ def record(
 ) -> None:
     """Record what a board streams, until --rows, --seconds or Ctrl-C."""
     with progress("recording", rows) as tick:
-        kept = record_board(port, output, rows, seconds, soft_reset if restart else lambda _: None, tick)
+        kept = record_board(port, output, rows, seconds, soft_reset if restart else lambda _: None, tick, True)
     if as_json:
         print_json({"output": str(output), "records": kept})
     else:

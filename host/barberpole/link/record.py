@@ -30,15 +30,17 @@ def record(
     seconds: float | None = None,
     start: Callable[[Line], None] = lambda _: None,
     tick: Callable[[int], None] | None = None,
+    stoppable: bool = False,
 ) -> int:
     """Write what the board sends to `target` (.bpr) until so many frames, so many seconds, or Ctrl-C; frames kept.
 
-    `start` is called once the port is open and listening. The file appears when the recording ends, by Ctrl-C or by an
-    unplugged cable too. Raises PortError if the port is not there or nothing was heard; no file is left then.
+    `start` is called once the port is open and listening. The file appears when the recording ends, by an unplugged
+    cable too, and by Ctrl-C if it is `stoppable`: otherwise Ctrl-C goes on to the caller, and nothing is kept. Raises
+    PortError if the port is not there or nothing was heard; no file is left then.
     """
     require_port(port)
     with arriving(target) as beside:
-        kept = _record(port, beside, frames, _Clock(seconds), start, tick or (lambda _: None))
+        kept = _record(port, beside, frames, _Clock(seconds), start, tick or (lambda _: None), stoppable)
         if not kept:
             silence = f"silence for {SILENCE_S if seconds is None else min(seconds, SILENCE_S):g} s"
             raise PortError(must(f"the board on {port}", "sending records (main.py running)", silence))
@@ -57,8 +59,8 @@ class _Clock:
         return self.seconds is None or time.monotonic() - self.began < self.seconds
 
 
-def _record(port: str, beside: Path, frames: int | None, clock: _Clock, start, tick) -> int:
-    """Frames written. Ctrl-C ends it where something was kept, and goes on to the caller where nothing was."""
+def _record(port: str, beside: Path, frames: int | None, clock: _Clock, start, tick, stoppable: bool) -> int:
+    """Frames written. Ctrl-C may end it where something was kept; where nothing was, it goes on to the caller."""
     kept = 0
     try:
         with serial.Serial(port, 115200, timeout=0.2) as line, beside.open("wb") as file:
@@ -68,7 +70,7 @@ def _record(port: str, beside: Path, frames: int | None, clock: _Clock, start, t
                 kept += 1
                 tick(1)
     except KeyboardInterrupt:
-        if not kept:
+        if not (kept and stoppable):
             raise
     except serial.SerialException as error:
         raise PortError(must("the port", "one that can be opened", error, port)) from None
