@@ -86,6 +86,40 @@ def test_what_cannot_be_seen_or_judged_is_said():
     assert said.cannot_be_judged["load_current"] == "no load_a column"
 
 
+def test_a_common_lag_shows_in_scalar_data_only_where_the_field_steps():
+    assert "lag" in said_of(Recipe({}, reference="constant", smooth=True, seed=3)).cannot_be_seen
+    assert "lag" not in said_of(Recipe({}, reference="constant", seed=3)).cannot_be_seen
+    assert "lag" not in said_of(Recipe({}, smooth=True, seed=3)).cannot_be_seen
+
+
+def test_an_effect_below_its_standard_error_cannot_be_seen():
+    """At one temperature its jitter still shows a huge coefficient, but none that a real sensor has."""
+    said = said_of(Recipe({}, still_temperature=True, seed=3))
+    assert {"bias_temperature", "sensitivity_temperature"} <= set(said.cannot_be_seen)
+    assert "warm the sensor" in said.next_experiment
+    assert said_of(Recipe({}, seed=3)).cannot_be_seen == ("soft_iron",)
+
+
+def test_what_the_model_already_has_needs_no_recording():
+    said = said_of(Recipe({}, seed=3))
+    assert said.next_experiment.startswith("this log cannot show soft_iron: it is indistinguishable from misalignment")
+
+
+def test_the_recording_that_parts_a_pair_is_computed():
+    columns = record(Recipe({"drift": 1.0}, seed=50))
+    columns["temp_c"] = 20.0 + 0.1 * columns["t_s"]
+    said = diagnose(log_of(columns), model_of(BASE))
+    assert {said.suspects[0].effect, *said.suspects[0].confounded_with} == {"drift", "bias_temperature"}
+    assert "an hour later at the same temperature" in said.next_experiment
+
+
+def test_a_bent_bridge_and_a_bent_converter_part_where_raw_readings_are_flipped():
+    said = said_of(Recipe({"quadratic": 1.0}, seed=50))
+    assert {said.suspects[0].effect, *said.suspects[0].confounded_with} == {"quadratic", "adc_inl"}
+    assert "RESET with its own sign" in said.next_experiment
+    assert said_of(Recipe({"quadratic": 1.0}, form="pairs", seed=50)).suspects[0].confounded_with == ()
+
+
 @pytest.mark.parametrize("scale", [0.3, 10_000.0])
 def test_units_do_not_matter(scale):
     said = said_of(Recipe({"quadratic": 0.5}, lsb_per_ut=scale, seed=18))

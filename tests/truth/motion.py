@@ -28,6 +28,13 @@ def _turn(start: np.ndarray, samples: int, rng: np.random.Generator) -> np.ndarr
     return along[:, None] + across[:, None] * np.cos(angle) + np.cross(axis, start)[:, None] * np.sin(angle)
 
 
+def smooth(n: int, rng: np.random.Generator) -> np.ndarray:
+    """(3, n) unit vectors: slow turns through all directions without a stop or a step."""
+    t, (a, b) = np.arange(n), rng.uniform(0.008, 0.015, 2)
+    z = np.sin(a * t + rng.uniform(0, 2 * np.pi))
+    return np.stack([np.sqrt(1 - z * z) * np.cos(2.3 * b * t), np.sqrt(1 - z * z) * np.sin(2.3 * b * t), z])
+
+
 def planar(n: int, rng: np.random.Generator) -> np.ndarray:
     """(3, n): turning about the vertical only, the field dipping 60 degrees."""
     angle = np.linspace(0, rng.uniform(3, 8) * 2 * np.pi, n)

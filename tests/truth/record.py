@@ -26,6 +26,7 @@ class Recipe:
     lsb_per_ut: float = 10.0
     noise_ut: float = 0.2
     planar: bool = False
+    smooth: bool = False
     still_temperature: bool = False
     seed: int = 0
 
@@ -33,7 +34,7 @@ class Recipe:
 def scene_of(recipe: Recipe, rows: int) -> Scene:
     """The scene a recipe asks for."""
     rng = np.random.default_rng(recipe.seed)
-    turn = motion.planar if recipe.planar else motion.directions
+    turn = motion.planar if recipe.planar else motion.smooth if recipe.smooth else motion.directions
     field = 50.0 * turn(rows, rng)
     if recipe.reference == "vector" and not recipe.planar:
         field = field * np.repeat(rng.uniform(0.6, 1.2, rows // 100 + 1), 100)[:rows]

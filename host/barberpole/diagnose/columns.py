@@ -4,7 +4,7 @@ Where the derivative at the null explains nothing (cross_field of demodulated re
 effect's typical size stands in. Effects with inner parameters bring several forms.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ class Candidate:
     parameters.
 
     held: other parameters of the effect, which this form leaves alone.
+    raw_rms: what the effect does to the readings at its typical size, LSB.
     start: of a refit, by name; linear: the least-squares weights are better ones. even: a parameter of no sign, whose
     column is a secant because its derivative at the null is zero.
     """
@@ -38,6 +39,8 @@ class Candidate:
     start: dict[str, float]
     tried: int = 1
     held: tuple[str, ...] = ()
+    shape: Shape = field(default_factory=Shape)
+    raw_rms: float = 0.0
 
 
 def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, Any], setup: Setup) -> Candidate:
@@ -65,7 +68,20 @@ def candidate(ground: Ground, effect: Effect, shape: Shape, settings: dict[str, 
         start,
         shape.tried,
         tuple(q.name for q, w in zip(params, wanted, strict=True) if not w and not q.inner),
+        shape,
+        _raw_rms(columns, typical[wanted]),
     )
+
+
+def again(form: Candidate, ground: Ground) -> Candidate:
+    """The same form in another recording."""
+    return candidate(ground, form.effect, form.shape, form.setup.settings, form.setup)
+
+
+def _raw_rms(parts: Parts, typical: np.ndarray) -> float:
+    """Of what all parameters together, each at its typical size, add to the readings."""
+    power = [float(np.mean((np.abs(typical[index]) @ rows) ** 2)) if index.size else 0.0 for index, rows in parts]
+    return float(np.sqrt(np.mean(power)))
 
 
 def _columns(ground, effect, null, typical, wanted, secant: float) -> tuple[Parts, np.ndarray]:

@@ -14,6 +14,7 @@ from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
 from barberpole.diagnose.search import Found, linear_drop, recheck, search
 from barberpole.diagnose.still import Still, still
 from barberpole.diagnose.stretches import in_full, part_of
+from barberpole.diagnose.visibility import Visible, unseen, visibility
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
@@ -24,7 +25,6 @@ from barberpole.observations import Observations, observations
 from barberpole.sensor import Sensor
 
 GEOMETRY = 30.0  # condition number of the linear part above which nothing is named (full turns: below 6)
-BLIND = 0.05  # of an effect's RMS left by the baseline: below it this log cannot see the effect
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
 ENOUGH_ROWS = 8  # residuals a column: with fewer, the colour of the noise is lost in what the columns take
@@ -57,7 +57,7 @@ class Diagnosis:
     cannot_be_seen: tuple[str, ...]
     cannot_be_judged: dict[str, str]
     next_experiment: str
-    visibility: dict[str, float] = field(default_factory=dict)
+    visibility: dict[str, Visible] = field(default_factory=dict)
     fits: tuple[Fit, ...] = field(default=(), repr=False)
 
     def to_json(self) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def diagnose_observations(
         return _noise_unknown(first, absent, patterns(first))
     found, last = search(first, absent, extra)
     found = recheck(found, first.white, extra)
-    return _conclude(fit, first, last, absent, found)
+    return _conclude(fit, first, last, absent, found, extra)
 
 
 def _about_its_temperature(seen: Observations) -> Observations:
@@ -133,7 +133,9 @@ def _geometry(fit: Fit) -> str:
     return ""
 
 
-def _conclude(fit: Fit, first: Evidence, last: Evidence, absent: Absent, found: list[Found]) -> Diagnosis:
+def _conclude(
+    fit: Fit, first: Evidence, last: Evidence, absent: Absent, found: list[Found], extra: Sequence[Effect]
+) -> Diagnosis:
     """The verdict from the evidence beside the model given and beside it with all effects found."""
     remains = _remains(last)
     verdict = _verdict(found, _covered(found, last), bool(remains))
@@ -141,8 +143,9 @@ def _conclude(fit: Fit, first: Evidence, last: Evidence, absent: Absent, found: 
         return _noise_unknown(first, absent, patterns(first))
     if verdict == "unexplained":
         found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, last)]
-    visible = _visibility(last)
-    blind = tuple(n for n, v in visible.items() if v < BLIND)
+    visible = visibility(last, absent)
+    rivals = {name for f in found for name in f.rivals}
+    blind = tuple(name for name in unseen(visible) if name not in rivals)
     groups = [(f.effect, *f.rivals) for f in found if f.rivals]
     found, white = in_full(fit, found), first.white
     return Diagnosis(
@@ -154,7 +157,7 @@ def _conclude(fit: Fit, first: Evidence, last: Evidence, absent: Absent, found: 
         patterns=tuple(remains if verdict == "unexplained" else patterns(first)),
         cannot_be_seen=blind,
         cannot_be_judged=absent.unjudged,
-        next_experiment=next_experiment(verdict, groups, blind, remains if found else []),
+        next_experiment=next_experiment(first, verdict, groups, blind, remains if found else [], extra),
         visibility=visible,
         fits=(fit, *(f.fit for f in found)),
     )
@@ -171,8 +174,7 @@ def _unsure_of_noise(first: Evidence) -> bool:
 
 def _noise_unknown(first: Evidence, absent: Absent, shown: list[Pattern]) -> Diagnosis:
     fit, noise = first.fit, first.white.noise
-    visible = _visibility(first)
-    blind = tuple(n for n, v in visible.items() if v < BLIND)
+    visible = visibility(first, absent)
     return Diagnosis(
         "inconclusive",
         fit.problem.n,
@@ -180,7 +182,7 @@ def _noise_unknown(first: Evidence, absent: Absent, shown: list[Pattern]) -> Dia
         fit.rms_lsb,
         (),
         tuple(shown),
-        blind,
+        unseen(visible),
         absent.unjudged,
         f"the residual is correlated in time, and nothing says how much of that is the sensor's noise: {REST}",
         visible,
@@ -210,15 +212,6 @@ def _verdict(found: list[Found], covered: float, leftover: bool) -> str:
     if not found:
         return "unexplained" if leftover else "adequate"
     return "unexplained" if leftover and covered < COVERED else "missing"
-
-
-def _visibility(evidence: Evidence) -> dict[str, float]:
-    """Of each absent effect, the largest part of its RMS that survives the baseline."""
-    out: dict[str, float] = {}
-    for shape, columns in zip(evidence.candidates, evidence.places, strict=True):
-        name = shape.effect.name
-        out[name] = max(out.get(name, 0.0), evidence.projection.visibility(columns))
-    return out
 
 
 def _suspect(found: Found) -> Suspect:

@@ -65,7 +65,9 @@ def best_addition(evidence: Evidence, extra: Sequence[Effect]) -> Found | None:
     ranked = promising(evidence)
     tried = [at for gain, at in ranked if gain >= IN_REACH * ranked[0][0]]
     trials = [attempt(evidence, at, extra) for at in tried]
-    worth = sorted((t for t in trials if t and t.gain > ENOUGH), key=lambda t: -t.gain)
+    forms = forms_tried(evidence)
+    worth = [t for t in trials if t and t.gain > ENOUGH]
+    worth.sort(key=lambda t: 2.0 * np.log(forms[t.candidate.effect.name]) - t.gain)
     if not worth:
         return None
     others = [attempt(evidence, at, extra) for at in alike(evidence, worth[0], tried)]
@@ -118,11 +120,17 @@ def doubtful_readings(evidence: Evidence, absent: Absent) -> Found | None:
     return Found(effect.name, after, 2.0 * gain, fall, float(max(np.exp(-gain), 1e-300)), drop)
 
 
-def promising(evidence: Evidence) -> list[tuple[float, int]]:
-    """(linear gain, shape) of the best effects, one shape each."""
+def forms_tried(evidence: Evidence) -> dict[str, int]:
+    """How many alternatives were looked through for each effect."""
     forms: dict[str, int] = {}
     for shape in evidence.candidates:
         forms[shape.effect.name] = forms.get(shape.effect.name, 0) + shape.tried
+    return forms
+
+
+def promising(evidence: Evidence) -> list[tuple[float, int]]:
+    """(linear gain, shape) of the best effects, one shape each."""
+    forms = forms_tried(evidence)
     best: dict[str, tuple[float, int]] = {}
     for at, shape in enumerate(evidence.candidates):
         gain = evidence.gain(evidence.places[at], forms[shape.effect.name])
