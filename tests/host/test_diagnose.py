@@ -1,12 +1,16 @@
 """Naming a missing effect, on logs of the independent truth and on real ones."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from barberpole.diagnose import Diagnosis, diagnose
+from barberpole.diagnose.noise import Noise
+from barberpole.diagnose.resting import longest_rest, noise_of
 from barberpole.log import read_log
+from barberpole.observations import observations
 from truth.record import Recipe, record, rest
 from truth.trials import BASE, confusion, judge, log_of, model_of, rates, trials
 
@@ -48,6 +52,51 @@ def test_nothing_missing_is_adequate(form, corner):
 def test_coloured_noise_of_a_scalar_log_is_taken_from_the_record_at_rest():
     said = said_of(Recipe({}, reference="constant", corner=1 / 3, seed=13), with_rest=True)
     assert said.verdict == "adequate"
+
+
+def test_a_stretch_at_rest_within_the_log_makes_the_noise():
+    recipe = Recipe({"bias_temperature": 1.0}, rows=3500, reference="constant", corner=1 / 3, seed=901)
+    assert said_of(recipe).verdict == "inconclusive"
+    said = said_of(replace(recipe, resting=1200))
+    assert (said.verdict, said.suspects[0].effect) == ("missing", "bias_temperature")
+
+
+@pytest.mark.parametrize("form", ["flips", "pairs", "unflipped"])
+def test_rest_is_found_where_it_is(form):
+    for resting, found in ((1200, True), (0, False)):
+        recipe = Recipe({}, reference="constant", form=form, resting=resting, corner=0.1, seed=902)
+        seen = observations(log_of(record(recipe)))
+        rows = longest_rest(seen.y, np.broadcast_to(np.asarray(seen.at.state, float), seen.y.shape[1:]))
+        assert (rows is not None) == found
+        if rows is not None:
+            ends = resting * (2 if form == "pairs" else 1)
+            assert (rows.start, rows.stop) == (0, pytest.approx(ends, abs=60))
+
+
+@pytest.mark.parametrize("corner", [0.03, 0.1, 1 / 3])
+def test_the_rest_record_may_have_another_rate(corner):
+    recipe = Recipe({}, reference="constant", corner=corner, seed=970)
+    log = observations(log_of(record(recipe)))
+    own = noise_of(observations(log_of(rest(recipe))), log, Noise(np.ones(1)))
+    slow = noise_of(observations(log_of(rest(recipe, slower=4))), log, own)
+    f = np.array([0.003, 0.03])
+    assert np.mean(slow.white) * slow.shape(f) == pytest.approx(np.mean(own.white) * own.shape(f), rel=0.5)
+    assert diagnose(log_of(record(recipe)), model_of(BASE), log_of(rest(recipe, 4))).verdict == "adequate"
+
+
+@pytest.mark.parametrize("reference", ["constant", "vector"])
+@pytest.mark.parametrize("sigmas", [20, 200])
+def test_huge_spikes_are_named_and_hide_nothing(reference, sigmas):
+    recipe = Recipe({"quadratic": 1.0}, reference=reference, seed=40)
+    columns, rng = record(recipe), np.random.default_rng(1)
+    for axis in "xyz":
+        hit = rng.random(recipe.rows) < 0.005
+        columns[f"{axis}_lsb"] = columns[f"{axis}_lsb"] + hit * rng.choice([-1, 1], recipe.rows) * sigmas * 2.0
+    said = diagnose(log_of(columns), model_of(BASE))
+    assert said.verdict == "missing"
+    assert {s.effect for s in said.suspects} == {"quadratic", "outliers"}
+    clean = said_of(recipe)
+    assert said.suspects[-1].rms_after_lsb == pytest.approx(clean.suspects[-1].rms_after_lsb, rel=0.05)
 
 
 @pytest.mark.parametrize("effect", ["telegraph", "ripple", "triple"])

@@ -16,7 +16,10 @@ REST_S = 60.0
 
 @dataclass(frozen=True)
 class Recipe:
-    """What to record. hidden: effect -> raw RMS over the noise RMS. corner: of the 1/f noise, as a part of fs."""
+    """What to record. hidden: effect -> raw RMS over the noise RMS. corner: of the 1/f noise, as a part of fs.
+
+    resting: samples at the start in which the sensor lies still.
+    """
 
     hidden: dict[str, float]
     rows: int = 3000
@@ -27,6 +30,7 @@ class Recipe:
     noise_ut: float = 0.2
     planar: bool = False
     smooth: bool = False
+    resting: int = 0
     still_temperature: bool = False
     seed: int = 0
 
@@ -36,6 +40,7 @@ def scene_of(recipe: Recipe, rows: int) -> Scene:
     rng = np.random.default_rng(recipe.seed)
     turn = motion.planar if recipe.planar else motion.smooth if recipe.smooth else motion.directions
     field = 50.0 * turn(rows, rng)
+    field[:, : recipe.resting] = field[:, recipe.resting, None]
     if recipe.reference == "vector" and not recipe.planar:
         field = field * np.repeat(rng.uniform(0.6, 1.2, rows // 100 + 1), 100)[:rows]
     temp = (
@@ -113,12 +118,13 @@ def _columns(recipe: Recipe, scene: Scene, y: np.ndarray) -> dict[str, np.ndarra
     return out | {f"i{a}_ma": scene.i_ma[i, every] for i, a in enumerate("xyz")}
 
 
-def rest(recipe: Recipe) -> dict[str, np.ndarray]:
-    """60 s of the same sensor lying still."""
-    n = int(REST_S * FS_HZ)
+def rest(recipe: Recipe, slower: int = 1) -> dict[str, np.ndarray]:
+    """60 s of the same sensor lying still, or `slower` times as long at a rate so much lower (every n-th sample)."""
+    n = int(REST_S * FS_HZ) * slower
     rng = np.random.default_rng(recipe.seed + 20_000_000)
     y = recipe.lsb_per_ut * (noise.draw(n, recipe.noise_ut, recipe.corner, rng) + np.array([[20.0], [-10.0], [40.0]]))
-    return {"t_s": np.arange(n) / FS_HZ} | {f"{a}_lsb": y[i] for i, a in enumerate("xyz")}
+    y = y[:, ::slower]
+    return {"t_s": np.arange(n)[::slower] / FS_HZ} | {f"{a}_lsb": y[i] for i, a in enumerate("xyz")}
 
 
 def write(columns: dict[str, np.ndarray], path: Path) -> Path:

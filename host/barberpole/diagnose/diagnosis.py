@@ -1,20 +1,21 @@
 """Which effect is missing from a model, as far as this log can tell."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
+from barberpole.diagnose.answer import Diagnosis, at_rest_answer, inconclusive, suspect
 from barberpole.diagnose.candidates import Absent, absent_effects
 from barberpole.diagnose.evidence import Evidence, examine
 from barberpole.diagnose.experiments import REST, next_experiment
-from barberpole.diagnose.noise import estimate
+from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
-from barberpole.diagnose.search import Found, linear_drop, recheck, search
-from barberpole.diagnose.still import Still, still
+from barberpole.diagnose.resting import noise_of, noise_within
+from barberpole.diagnose.search import Found, giant_readings, linear_drop, recheck, search
+from barberpole.diagnose.still import still
 from barberpole.diagnose.stretches import in_full, part_of
-from barberpole.diagnose.visibility import Visible, unseen, visibility
+from barberpole.diagnose.visibility import unseen, visibility
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
@@ -31,41 +32,6 @@ ENOUGH_ROWS = 8  # residuals a column: with fewer, the colour of the noise is lo
 CLEAR = 0.1  # fall of the held-out error that no noise makes
 MAIN_CAUSE = 0.3  # of what can be explained: a suspect that leaves structure must take this much to be named
 LINEAR = ("bias", "scale", "misalignment")
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """An effect that explains the excess. rms_after_lsb: with it and those before it put in."""
-
-    effect: str
-    p_value: float
-    rms_after_lsb: float
-    heldout_drop: float
-    confounded_with: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """The answer; `to_json` is the object of `diagnose --json`. fits: the model given, then with each suspect."""
-
-    verdict: str
-    n: int
-    noise_lsb: float
-    rms_lsb: float
-    suspects: tuple[Suspect, ...]
-    patterns: tuple[Pattern, ...]
-    cannot_be_seen: tuple[str, ...]
-    cannot_be_judged: dict[str, str]
-    next_experiment: str
-    visibility: dict[str, Visible] = field(default_factory=dict)
-    fits: tuple[Fit, ...] = field(default=(), repr=False)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain numbers, strings, lists and dictionaries."""
-        shown = {k: v for k, v in vars(self).items() if k not in ("fits", "visibility")}
-        shown["suspects"] = [asdict(s) | {"confounded_with": list(s.confounded_with)} for s in self.suspects]
-        shown["patterns"] = [asdict(p) for p in self.patterns]
-        return shown | {"cannot_be_seen": list(self.cannot_be_seen)}
 
 
 def diagnose(
@@ -92,23 +58,39 @@ def diagnose_observations(
     """The same on observations."""
     at_rest = still(seen)
     if at_rest is not None:
-        return _at_rest(seen, at_rest)
+        return at_rest_answer(seen, at_rest)
     try:
         fit = fit_observations(_about_its_temperature(seen), file, extra)
     except InputError as error:
-        return _inconclusive(seen, str(error))
+        return inconclusive(seen, str(error))
     absent = absent_effects(fit, extra, file.settings, state_known)
     lack = _geometry(fit)
     if lack:
-        return _inconclusive(seen, lack, fit, absent)
-    first = examine(part_of(fit), absent, None, extra)
-    noise = first.background() if rest is None else estimate(rest.y, "rest")
-    first = first.under(whitening(noise, first.fit.problem.n, first.ground.normal))
+        return inconclusive(seen, lack, fit, absent)
+    part, how = part_of(fit), (fit, absent, rest, extra)
+    said = _judge(examine(part, absent, None, extra), [], *how)
+    giants = giant_readings(part, absent) if said.verdict == "inconclusive" else None
+    return _judge(examine(giants.fit, absent, None, extra), [giants], *how) if giants else said
+
+
+def _judge(
+    first: Evidence, put_in: list[Found], fit: Fit, absent: Absent, rest: Observations | None, extra: Sequence[Effect]
+) -> Diagnosis:
+    """The answer from the evidence beside a model with the effects `put_in`."""
+    seen = fit.problem.seen
+    noise = first.background()
+    first = _under(first, noise if rest is None else noise_of(rest, seen, noise))
+    if _unsure_of_noise(first) and (within := noise_within(seen)) is not None:
+        first = _under(first, within)
     if _unsure_of_noise(first) and 0.0 < linear_drop(first) < 0.5 * CLEAR:
         return _noise_unknown(first, absent, patterns(first))
     found, last = search(first, absent, extra)
-    found = recheck(found, first.white, extra)
+    found = put_in + recheck(found, first.white, extra)
     return _conclude(fit, first, last, absent, found, extra)
+
+
+def _under(evidence: Evidence, noise: Noise) -> Evidence:
+    return evidence.under(whitening(noise, evidence.fit.problem.n, evidence.ground.normal))
 
 
 def _about_its_temperature(seen: Observations) -> Observations:
@@ -153,7 +135,7 @@ def _conclude(
         n=fit.problem.n,
         noise_lsb=white.noise.rms(fit.problem.n),
         rms_lsb=fit.rms_lsb,
-        suspects=tuple(map(_suspect, found)),
+        suspects=tuple(map(suspect, found)),
         patterns=tuple(remains if verdict == "unexplained" else patterns(first)),
         cannot_be_seen=blind,
         cannot_be_judged=absent.unjudged,
@@ -212,30 +194,3 @@ def _verdict(found: list[Found], covered: float, leftover: bool) -> str:
     if not found:
         return "unexplained" if leftover else "adequate"
     return "unexplained" if leftover and covered < COVERED else "missing"
-
-
-def _suspect(found: Found) -> Suspect:
-    return Suspect(found.effect, found.p_value, found.fit.rms_lsb, found.heldout_drop, found.rivals)
-
-
-def _at_rest(seen: Observations, found: Still) -> Diagnosis:
-    """A group of causes at most: nothing here tells one from another."""
-    suspects = tuple(Suspect(name, 1e-300, found.noise_lsb, 0.0, found.causes[1:]) for name in found.causes[:1])
-    n = seen.y.shape[1]
-    return Diagnosis("inconclusive", n, found.noise_lsb, found.rms_lsb, suspects, found.patterns, (), {}, found.advice)
-
-
-def _inconclusive(seen: Observations, why: str, fit: Fit | None = None, absent: Absent | None = None) -> Diagnosis:
-    rms = fit.rms_lsb if fit else float("nan")
-    return Diagnosis(
-        "inconclusive",
-        seen.y.shape[1],
-        float("nan"),
-        rms,
-        (),
-        (),
-        (),
-        absent.unjudged if absent else {},
-        why,
-        fits=(fit,) if fit else (),
-    )

@@ -39,9 +39,13 @@ class Noise:
         """RMS in LSB over a record of n samples, all channels together."""
         return float(np.sqrt(np.mean(self.white) * np.mean(self.shape(np.arange(1, n // 2 + 1) / n))))
 
-    def at_rate(self, ratio: float) -> "Noise":
-        """The same sensor sampled `ratio` times as often."""
-        return replace(self, corner=self.corner / ratio)
+    def at_rate(self, ratio: float, level: float = 1.0) -> "Noise":
+        """The same sensor sampled `ratio` times as often, each sample with `level` times the white power.
+
+        The power law keeps its density in LSB^2/Hz; what the white part becomes hangs on what was averaged.
+        """
+        corner = self.corner * (ratio ** (1.0 - self.exponent) / level) ** (1.0 / self.exponent)
+        return replace(self, corner=corner, white=self.white * level)
 
     def common(self) -> "Noise":
         """The same for one channel: the mean of the axes."""

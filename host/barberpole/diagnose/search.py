@@ -9,11 +9,12 @@ from barberpole.diagnose.candidates import Absent
 from barberpole.diagnose.columns import Candidate
 from barberpole.diagnose.evidence import Evidence, bic_gain, examine, whitened_rss
 from barberpole.diagnose.table import heldout, project
-from barberpole.diagnose.tails import LIKELIER, LIKELIER_COLOURED, wrong_readings
+from barberpole.diagnose.tails import LIKELIER, LIKELIER_COLOURED, lonely_giants, wrong_readings
 from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
 from barberpole.fit.fit import Fit, believable, refit, setup_of
+from barberpole.fit.start import start_values
 
 ENOUGH = 10.0  # gain in BIC that a name needs
 REFITTED = 3  # candidates refitted exactly each round
@@ -105,19 +106,42 @@ def attempt(evidence: Evidence, at: int, extra: Sequence[Effect]) -> Trial | Non
 
 def doubtful_readings(evidence: Evidence, absent: Absent) -> Found | None:
     """The effect that weighs single wrong readings down, if there are any and the model lacks it."""
-    effect = next((e for e in absent.effects if e.loss and e.name not in evidence.fit.model.effects), None)
+    effect = _loss(evidence.fit, absent)
     if effect is None:
         return None
     residual = evidence.ground.residual
     gain = wrong_readings(residual, bool(evidence.white.filter))
     if gain <= (LIKELIER_COLOURED if evidence.white.filter else LIKELIER):
         return None
-    setup = setup_of(evidence.fit.problem.seen, evidence.fit.linear, absent.settings.get(effect.name))
-    after = refit(evidence.fit, evidence.fit.setups | {effect.name: setup}, {})
+    after = _weighed(evidence.fit, effect, absent, {})
     left = np.sum((residual * believable(residual)) ** 2) / np.sum(residual**2)
     fall = evidence.projection.rss * float(1.0 - left)
     drop = 1.0 - after.heldout_rms_lsb / evidence.fit.heldout_rms_lsb
     return Found(effect.name, after, 2.0 * gain, fall, float(max(np.exp(-gain), 1e-300)), drop)
+
+
+def giant_readings(fit: Fit, absent: Absent) -> Found | None:
+    """The same where readings are so wrong that they lead the fit astray: judged from its closed-form start."""
+    effect = _loss(fit, absent)
+    start = start_values(fit.model, fit.linear)
+    residual = fit.problem.residual(start)
+    gain = lonely_giants(residual)
+    if effect is None or gain <= LIKELIER_COLOURED:
+        return None
+    after = _weighed(fit, effect, absent, dict(zip(fit.model.names, start.tolist(), strict=True)))
+    drop = 1.0 - after.heldout_rms_lsb / fit.heldout_rms_lsb
+    fall = float(np.sum(fit.problem.residual(fit.p) ** 2) / after.rms_lsb**2 - residual.size)
+    return Found(effect.name, after, 2.0 * gain, max(fall, 0.0), float(max(np.exp(-gain), 1e-300)), drop)
+
+
+def _loss(fit: Fit, absent: Absent) -> Effect | None:
+    """The effect that weighs residuals, if the model lacks it."""
+    return next((e for e in absent.effects if e.loss and e.name not in fit.model.effects), None)
+
+
+def _weighed(fit: Fit, effect: Effect, absent: Absent, start: dict[str, float]) -> Fit:
+    setup = setup_of(fit.problem.seen, fit.linear, absent.settings.get(effect.name))
+    return refit(fit, fit.setups | {effect.name: setup}, start)
 
 
 def forms_tried(evidence: Evidence) -> dict[str, int]:

@@ -7,6 +7,8 @@ LIKELIER_COLOURED = 30.0  # the same beside a median of neighbours, which is onl
 CLUMPED = 4.0  # in standard errors: squared residuals this alike from sample to sample are no single outliers
 EM_STEPS = 30
 LARGE = 9.0  # squared residuals count as this at most where their likeness is judged: giants would make any
+GIANT = 12.0  # robust standard deviations
+RARE = 0.05  # of all readings may be giants
 REACH = 2  # samples on either side that an outlier is held against
 STEP = 9  # samples on either side of a possible jump; medians of nine pass over single outliers
 MAD = 1.4826  # of a normal distribution: standard deviation over median absolute deviation
@@ -20,6 +22,16 @@ def wrong_readings(residual: np.ndarray, coloured: bool) -> float:
     square -= square.mean(axis=1, keepdims=True)
     alike = np.sum(square[:, apart:] * square[:, :-apart]) / np.sum(square * square) * np.sqrt(square.size)
     return 0.0 if alike > CLUMPED else two_populations((z / np.maximum(spread, 1e-300)).ravel())
+
+
+def lonely_giants(residual: np.ndarray) -> float:
+    """Evidence for single readings far beyond all others in residuals (m, n); 0 if they are many or stand together."""
+    z = np.abs(beside_neighbours(residual))
+    giant = z > GIANT * MAD * np.median(z, axis=1, keepdims=True)
+    together = np.count_nonzero(giant[:, 1:] & giant[:, :-1])
+    if np.mean(giant) > RARE or together > 0.2 * np.count_nonzero(giant):
+        return 0.0
+    return float(np.count_nonzero(giant)) * GIANT**2 / 2.0
 
 
 def beside_neighbours(residual: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from barberpole.observations import Observations, observations
 
 OUTLIER = 4.0  # robust standard deviations; one normal reading in 16 000 lies beyond
 MAD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
+GIANT = 20.0  # the same at the start of a fit, whose residual is not all noise yet
 OUTLIER_PASSES = 4
 NOMINAL_MAGNITUDE_UT = 50.0  # where only its constancy is known; the scale is then relative to it
 
@@ -187,6 +188,8 @@ def fit_problem(
         raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
     if problem.model.loss is None:
         problem = replace(problem, believed=None)
+    elif problem.believed is None:
+        problem = replace(problem, believed=believable(problem.residual(p), GIANT))  # else they lead the fit astray
     fitted = np.array([name not in held for name in problem.model.names])
     solution = _determined(problem, p, fitted, tick)
     for _ in range(OUTLIER_PASSES if problem.model.loss else 0):
@@ -199,10 +202,10 @@ def fit_problem(
     return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra, held)
 
 
-def believable(residual: np.ndarray) -> np.ndarray:
-    """Mask (m, n) of residuals within OUTLIER robust standard deviations of their channel's median."""
+def believable(residual: np.ndarray, limit: float = OUTLIER) -> np.ndarray:
+    """Mask (m, n) of residuals within `limit` robust standard deviations of their channel's median."""
     apart = np.abs(residual - np.median(residual, axis=1, keepdims=True))
-    return apart <= OUTLIER * MAD * np.median(apart, axis=1, keepdims=True)
+    return apart <= limit * MAD * np.median(apart, axis=1, keepdims=True)
 
 
 def _freeze_undetermined(model: Model, solution: Solution, keep: np.ndarray) -> None:

@@ -45,6 +45,7 @@ def minimise(problem: Problem, p: np.ndarray, free: np.ndarray, tick: Callable[[
     return solution
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # a step too far costs inf or nan, and is not taken
 def descend(problem: Problem, p: np.ndarray, free: np.ndarray, sigma: float, tolerance: float, tick=None) -> Solution:
     """Steps until the cost falls by less than `tolerance` of it."""
     lower, upper = problem.model.bounds()

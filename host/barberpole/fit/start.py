@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from barberpole.effects.misalignment import LOWER, UPPER
-from barberpole.fit.ellipsoid import algebraic
+from barberpole.fit.ellipsoid import Ellipsoid, algebraic
 from barberpole.model import Model
 from barberpole.observations import Observations
+
+FAR = 8.0  # times the median distance from the ellipsoid; of normal noise 5.4 standard deviations
+TRIMS = 8
 
 
 @dataclass(frozen=True)
@@ -29,8 +32,20 @@ def linear_part(seen: Observations, magnitude_ut: float) -> Linear:
     if seen.b_ut is not None:
         return _against_field(seen.y, seen.b_ut)
     known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude_ut
-    shape = algebraic(seen.y, known)
+    shape = trimmed(seen.y, known)
     return Linear(np.linalg.inv(shape.upper), shape.centre, known)
+
+
+def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
+    """The algebraic ellipsoid of readings (3, n), repeated without those far off it: its squares square an outlier."""
+    shape, kept = algebraic(y, magnitude_ut), np.ones(y.shape[1], bool)
+    for _ in range(TRIMS):
+        apart = np.abs(np.linalg.norm(shape.field(y), axis=0) - magnitude_ut)
+        near = apart <= FAR * float(np.median(apart))
+        if np.array_equal(near, kept) or np.mean(near) < 0.5:
+            break
+        shape, kept = algebraic(y[:, near], magnitude_ut), near
+    return shape
 
 
 def _against_field(y: np.ndarray, field_ut: np.ndarray) -> Linear:
