@@ -12,7 +12,7 @@ demo: $(STAMP)
 	@$(BIN)/barberpole demo
 
 test: lint
-	@$(BIN)/python -m pytest -n 2
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
 	@echo "make test: lint and all tests passed"
 
 lint: $(STAMP) $(STUBS)/.installed
@@ -26,7 +26,7 @@ bench: $(STAMP)
 
 # A few hundred logs of an independent truth: what is named, what is missed, what is alarmed falsely.
 trials: $(STAMP)
-	@PYTHONPATH=tests $(BIN)/python -m truth.trials
+	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m truth.trials
 
 docs: $(STAMP)
 	@$(BIN)/python -m barberpole.docs host/docs
