@@ -35,6 +35,7 @@ def test_the_worked_example_runs_on_what_the_demo_leaves(tmp_path, capsys, monke
     """Every command of the README that needs no board, letter by letter."""
     monkeypatch.chdir(tmp_path)
     assert run(["demo", "-o", "demo"]) == 0
+    assert Path("demo/.gitignore").read_text() == "*\n"  # `make test` after it lints nothing of it
     text = (Path(__file__).parents[2] / "README.md").read_text()
     listed = re.findall(r"^    barberpole (.*?)(?:  +#.*)?$", text, re.MULTILINE)
     told = [line for line in listed if "demo/" in line or line.startswith("build")]

@@ -56,7 +56,11 @@ def demo(
 
 def _writable(folder: Path) -> Path:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if not folder.exists():
+            folder.mkdir(parents=True)
+            (folder / ".gitignore").write_text("*\n")  # made inside a checkout, it is no part of it: linters pass it by
+        elif not folder.is_dir():
+            raise FileExistsError(0, "a file")
     except OSError as error:
         raise InputError(must("the output", "a folder that can be written", error.strerror, folder)) from None
     return folder
