@@ -69,8 +69,7 @@ def test_rest_is_found_where_it_is(form):
         rows = longest_rest(seen.y, np.broadcast_to(np.asarray(seen.at.state, float), seen.y.shape[1:]))
         assert (rows is not None) == found
         if rows is not None:
-            ends = resting * (2 if form == "pairs" else 1)
-            assert (rows.start, rows.stop) == (0, pytest.approx(ends, abs=60))
+            assert (rows.start, rows.stop) == (0, pytest.approx(resting, abs=60))
 
 
 @pytest.mark.parametrize("corner", [0.03, 0.1, 1 / 3])
