@@ -5,15 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from barberpole.diagnose.candidates import Absent
-from barberpole.diagnose.evidence import examine
-from barberpole.diagnose.search import attempt
+from barberpole.diagnose.candidates import Absent, absent_effects
+from barberpole.diagnose.evidence import examine, unsure_of_noise
+from barberpole.diagnose.search import attempt, doubtful_readings, forms_tried, giant_readings
+from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect, find_effect
 from barberpole.fit.fit import Fit, fit_observations, require_columns
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations
 
 EVIDENCE = 10.0  # fall of the information criterion below which an addition is not believed
+CLEAR = 0.1  # fall of the held-out error that no noise makes
 FORMS = 3  # of an effect, the most promising, that are fitted exactly
 
 
@@ -22,8 +24,10 @@ class Change:
     """A model before and after one effect was added or removed, on the same log.
 
     after_file  the model with the effect, and with the settings of the form that it takes in this log
-    pays        the error on held-out stretches falls, by more than the new parameters' freedom explains
     evidence    fall of the Bayesian information criterion, with the residual's own correlation discounted
+    believed    a diagnosis would take the effect for a cause: it shows in the residual of the model without it, beside
+                all that any other cause takes. A fit alone may follow the noise (a play on noisy readings)
+    pays        all that, and the error on held-out stretches falls
     """
 
     effect: str
@@ -32,10 +36,11 @@ class Change:
     after_file: ModelFile
     noise_lsb: float
     evidence: float
+    believed: bool = True
 
     @property
     def pays(self) -> bool:
-        return self.evidence > EVIDENCE and self.after.heldout_rms_lsb < self.before.heldout_rms_lsb
+        return self.believed and self.evidence > EVIDENCE and self.after.heldout_rms_lsb < self.before.heldout_rms_lsb
 
     def to_json(self) -> dict:
         """The object of `add --json`."""
@@ -65,24 +70,45 @@ def change(
     """
     old = fit_observations(seen, before, extra, tick)
     require_columns(seen, after.effects, extra)
-    new = best_form(old, effect, after.settings, extra) if effect in after.effects else None
+    adding = effect in after.effects
+    new, believed = best_form(old, effect, after.settings, extra) if adding else (None, True)
     if new is None:
         new = fit_observations(seen, after, extra, tick)
     else:
         name = find_effect(effect, extra).name
         after = replace(after, settings=after.settings | {name: new.setups[name].settings})
     residual = new.problem.residual(new.p)
-    return Change(effect, old, new, after, noise_from_differences(residual), _evidence(old, new, residual))
+    found = _evidence(old, new, residual)
+    return Change(effect, old, new, after, noise_from_differences(residual), found, believed)
 
 
-def best_form(fit: Fit, effect: str, settings: dict[str, dict], extra: Sequence[Effect] = ()) -> Fit | None:
-    """The exact fit with an effect in the form that gains most, None where no form gains anything."""
-    absent = Absent((find_effect(effect, extra),), settings, {})
-    evidence = examine(fit, absent, None, extra)
-    gains = [evidence.gain(places) for places in evidence.places]
-    best = np.argsort(gains)[::-1][:FORMS]
-    trials = [trial for at in best if (trial := attempt(evidence, int(at), extra)) is not None]
-    return max(trials, key=lambda trial: trial.gain).fit if trials else None
+def best_form(
+    fit: Fit, effect: str, settings: dict[str, dict], extra: Sequence[Effect] = ()
+) -> tuple[Fit | None, bool]:
+    """The exact fit with an effect in the form that gains most (None where no form gains anything), and whether a
+    diagnosis would believe in it."""
+    added = find_effect(effect, extra)
+    evidence = examine(fit, Absent((added, *_others(fit, added, extra)), settings, {}), None, extra)
+    evidence = evidence.under(whitening(evidence.background(), fit.problem.n, evidence.ground.normal))
+    if added.loss:
+        absent = Absent((added,), settings, {})
+        found = doubtful_readings(evidence, absent) or giant_readings(fit, absent)
+        return (found.fit, True) if found else (None, False)
+    forms = [at for at, form in enumerate(evidence.candidates) if form.effect.name == added.name]
+    best = sorted(forms, key=lambda at: -evidence.gain(evidence.places[at]))[:FORMS]
+    trials = [trial for at in best if (trial := attempt(evidence, at, extra)) is not None]
+    if not trials:
+        return None, False
+    seen = max(evidence.gain(evidence.places[at], forms_tried(evidence)[added.name]) for at in best) > EVIDENCE
+    trial = max(trials, key=lambda trial: trial.gain)
+    sure = not unsure_of_noise(evidence) or trial.fit.heldout_rms_lsb < (1.0 - CLEAR) * fit.heldout_rms_lsb
+    return trial.fit, seen and sure
+
+
+def _others(fit: Fit, added: Effect, extra: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Every other effect that the log can judge: what they take of the residual is no noise."""
+    absent = absent_effects(fit, extra, {}, True).effects
+    return tuple(effect for effect in absent if effect.name != added.name)
 
 
 def _evidence(old: Fit, new: Fit, residual: np.ndarray) -> float:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from barberpole.diagnose import Diagnosis, diagnose
+from barberpole.adding import change
+from barberpole.diagnose import Diagnosis, diagnose, diagnose_observations
 from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.resting import longest_rest, noise_of
 from barberpole.log import read_log
@@ -172,6 +173,47 @@ def test_a_bent_bridge_and_a_bent_converter_part_where_raw_readings_are_flipped(
 def test_units_do_not_matter(scale):
     said = said_of(Recipe({"quadratic": 0.5}, lsb_per_ut=scale, seed=18))
     assert said.suspects[0].effect == "quadratic"
+
+
+@pytest.mark.parametrize("reference", ["vector", "constant"])
+@pytest.mark.parametrize("effect", ["cross_field", "quadratic", "bias_temperature", "coil_coupling"])
+def test_the_order_of_the_axes_does_not_matter(effect, reference):
+    seen = observations(log_of(record(Recipe({effect: 0.7}, reference=reference, seed=21))))
+    order, easy = [2, 0, 1], seen.at.easy_axis
+    place = tuple(order.index(easy[axis]) for axis in order)
+    at = replace(seen.at, easy_axis=place, i_ma=seen.at.i_ma[order])
+    turned = replace(seen, y=seen.y[order], b_ut=None if seen.b_ut is None else seen.b_ut[order], at=at)
+    one, other = (diagnose_observations(s, model_of(BASE)) for s in (seen, turned))
+    assert [(s.effect, set(s.confounded_with)) for s in one.suspects] == [
+        (s.effect, set(s.confounded_with)) for s in other.suspects
+    ]
+    assert one.verdict == other.verdict == "missing"
+    assert set(one.cannot_be_seen) == set(other.cannot_be_seen)
+    assert other.suspects[0].rms_after_lsb == pytest.approx(one.suspects[0].rms_after_lsb, rel=1e-3)
+
+
+@pytest.mark.parametrize("scale", [0.3, 10_000.0])
+@pytest.mark.parametrize("reference", ["vector", "constant"])
+def test_units_change_no_verdict(scale, reference):
+    recipe = Recipe({"cross_field": 0.5}, reference=reference, seed=22)
+    one, other = said_of(recipe), said_of(replace(recipe, lsb_per_ut=scale))
+    assert [(s.effect, s.confounded_with) for s in one.suspects] == [
+        (s.effect, s.confounded_with) for s in other.suspects
+    ]
+    assert (one.verdict, one.cannot_be_seen) == (other.verdict, other.cannot_be_seen)
+
+
+@pytest.mark.parametrize(
+    ("reference", "effect", "other"),
+    [("vector", "drift", "hysteresis"), ("constant", "quadratic", "hysteresis"), ("constant", "drift", "outliers")],
+)
+def test_adding_the_right_effect_pays_and_a_wrong_one_does_not(reference, effect, other):
+    recipe = Recipe({effect: 1.0}, reference=reference, seed=610_006)
+    seen = observations(log_of(record(recipe)))
+    right = change(seen, model_of(BASE), model_of((*BASE, effect)), effect)
+    assert right.pays
+    assert right.after.heldout_rms_lsb == pytest.approx(2.0, rel=0.12)  # of noise, times the gain of an axis
+    assert not change(seen, model_of((*BASE, effect)), model_of((*BASE, effect, other)), other).pays
 
 
 def test_the_json_is_the_contract():

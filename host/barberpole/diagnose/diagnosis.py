@@ -7,9 +7,9 @@ import numpy as np
 
 from barberpole.diagnose.answer import Diagnosis, at_rest_answer, inconclusive, suspect
 from barberpole.diagnose.candidates import Absent, absent_effects
-from barberpole.diagnose.evidence import Evidence, examine
+from barberpole.diagnose.evidence import Evidence, examine, unsure_of_noise
 from barberpole.diagnose.experiments import REST, next_experiment
-from barberpole.diagnose.noise import Noise, estimate
+from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
 from barberpole.diagnose.resting import noise_of, noise_within
 from barberpole.diagnose.search import Found, giant_readings, linear_drop, recheck, search
@@ -28,7 +28,6 @@ from barberpole.sensor import Sensor
 GEOMETRY = 30.0  # condition number of the linear part above which nothing is named (full turns: below 6)
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
-ENOUGH_ROWS = 8  # residuals a column: with fewer, the colour of the noise is lost in what the columns take
 CLEAR = 0.1  # fall of the held-out error that no noise makes
 MAIN_CAUSE = 0.3  # of what can be explained: a suspect that leaves structure must take this much to be named
 LINEAR = ("bias", "scale", "misalignment")
@@ -80,9 +79,9 @@ def _judge(
     seen = fit.problem.seen
     noise = first.background()
     first = _under(first, noise if rest is None else noise_of(rest, seen, noise))
-    if _unsure_of_noise(first) and (within := noise_within(seen)) is not None:
+    if unsure_of_noise(first) and (within := noise_within(seen)) is not None:
         first = _under(first, within)
-    if _unsure_of_noise(first) and 0.0 < linear_drop(first) < 0.5 * CLEAR:
+    if unsure_of_noise(first) and 0.0 < linear_drop(first) < 0.5 * CLEAR:
         return _noise_unknown(first, absent, patterns(first))
     found, last = search(first, absent, extra)
     found = put_in + recheck(found, first.white, extra)
@@ -121,7 +120,7 @@ def _conclude(
     """The verdict from the evidence beside the model given and beside it with all effects found."""
     remains = _remains(last)
     verdict = _verdict(found, _covered(found, last), bool(remains))
-    if verdict != "adequate" and _unsure_of_noise(first) and not any(f.heldout_drop > CLEAR for f in found):
+    if verdict != "adequate" and unsure_of_noise(first) and not any(f.heldout_drop > CLEAR for f in found):
         return _noise_unknown(first, absent, patterns(first))
     if verdict == "unexplained":
         found = [f for f in found if f.fall > MAIN_CAUSE * _explainable(found, last)]
@@ -143,15 +142,6 @@ def _conclude(
         visibility=visible,
         fits=(fit, *(f.fit for f in found)),
     )
-
-
-def _unsure_of_noise(first: Evidence) -> bool:
-    """A scalar residual of coloured noise that nobody measured: slow structure and noise look alike in it."""
-    noise = first.white.noise
-    if first.ground.normal is None or noise.source != "residual":
-        return False
-    too_few = first.table.count < ENOUGH_ROWS * first.design.count
-    return noise.coloured or (too_few and estimate(first.ground.residual, "residual").coloured)
 
 
 def _noise_unknown(first: Evidence, absent: Absent, shown: list[Pattern]) -> Diagnosis:

@@ -16,6 +16,7 @@ from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import MAD, OUTLIER, Fit
 
+ENOUGH_ROWS = 8  # residuals a column: with fewer, the colour of the noise is lost in what the columns take
 FEW = 4  # residuals a column: with fewer, what is left of them is no noise
 
 
@@ -71,6 +72,15 @@ class Evidence:
         limit = OUTLIER * MAD * np.median(np.abs(left), axis=1, keepdims=True)
         left = np.clip(left, -limit, limit)  # a few giants would colour any spectrum
         return estimate(left, "residual", self.design.kept(self.products), self.ground.normal)
+
+
+def unsure_of_noise(evidence: Evidence) -> bool:
+    """A scalar residual of coloured noise that nobody measured: slow structure and noise look alike in it."""
+    noise = evidence.white.noise
+    if evidence.ground.normal is None or noise.source != "residual":
+        return False
+    too_few = evidence.table.count < ENOUGH_ROWS * evidence.design.count
+    return noise.coloured or (too_few and estimate(evidence.ground.residual, "residual").coloured)
 
 
 def bic_gain(rss: float, score: float, rank: int, count: float, forms: int = 1) -> float:
