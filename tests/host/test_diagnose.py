@@ -112,6 +112,18 @@ def test_a_weak_bow_of_the_converter_and_of_the_bridge_are_one_group(form):
     assert {"adc_inl", "quadratic"} <= {said.suspects[0].effect, *said.suspects[0].confounded_with}
 
 
+def test_noise_that_turns_from_axis_to_axis_does_not_jump():
+    """Stations of a scalar log: the residual is noise of one axis, then of another."""
+    recipe = Recipe({}, rows=8000, form="pairs", reference="constant", corner=0.1, seed=8_100_071)
+    assert said_of(recipe, with_rest=True).verdict == "adequate"
+
+
+def test_a_suspect_that_leaves_jumps_is_no_cause():
+    said = said_of(Recipe({"telegraph": 3.0}, seed=8_001_500))
+    assert said.verdict == "unexplained"
+    assert any("jumps" in p.shape for p in said.patterns)
+
+
 def test_two_effects_are_found_one_after_another():
     said = said_of(Recipe({"cross_field": 2.0, "bias_temperature": 2.0}, seed=15))
     assert {s.effect for s in said.suspects} == {"cross_field", "bias_temperature"}

@@ -54,8 +54,10 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Every hidden effect is named, first or in a group of its own, and nothing else is."""
+        """Every hidden effect is named, first or in a group of its own, and nothing else is; foreign ones are not."""
         hidden = set(self.trial.recipe.hidden)
+        if hidden & set(FOREIGN):
+            return self.verdict == "unexplained"
         if not hidden:
             return self.verdict == "adequate"
         return len(self.named) == len(hidden) and all(any(name in group for group in self.named) for name in hidden)

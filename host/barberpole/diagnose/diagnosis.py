@@ -10,7 +10,7 @@ from barberpole.diagnose.candidates import Absent, absent_effects
 from barberpole.diagnose.evidence import Evidence, examine, unsure_of_noise
 from barberpole.diagnose.experiments import REST, next_experiment
 from barberpole.diagnose.noise import Noise
-from barberpole.diagnose.patterns import Pattern, jump_patterns, patterns
+from barberpole.diagnose.patterns import JUMPS, Pattern, jump_patterns, patterns
 from barberpole.diagnose.resting import noise_of, noise_within
 from barberpole.diagnose.search import Found, giant_readings, linear_drop, recheck, search
 from barberpole.diagnose.still import still
@@ -119,7 +119,9 @@ def _conclude(
 ) -> Diagnosis:
     """The verdict from the evidence beside the model given and beside it with all effects found."""
     remains = _remains(last)
-    verdict = _verdict(found, _covered(found, last), bool(remains))
+    jumping = any(p.shape == JUMPS for p in remains)
+    settled = any(f.heldout_drop > CLEAR for f in found) if jumping else _covered(found, last) >= COVERED
+    verdict = _verdict(found, settled, bool(remains))
     if verdict != "adequate" and unsure_of_noise(first) and not any(f.heldout_drop > CLEAR for f in found):
         return _noise_unknown(first, absent, patterns(first))
     if verdict == "unexplained":
@@ -180,7 +182,8 @@ def _covered(found: list[Found], left: Evidence) -> float:
     return sum(f.fall for f in found) / max(_explainable(found, left), 1e-300)
 
 
-def _verdict(found: list[Found], covered: float, leftover: bool) -> str:
+def _verdict(found: list[Found], settled: bool, leftover: bool) -> str:
+    """settled: whether what was found explains most of what can be, jumps aside."""
     if not found:
         return "unexplained" if leftover else "adequate"
-    return "unexplained" if leftover and covered < COVERED else "missing"
+    return "unexplained" if leftover and not settled else "missing"

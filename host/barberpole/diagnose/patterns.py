@@ -9,6 +9,7 @@ from barberpole.diagnose.tails import LIKELIER, jumps
 from barberpole.diagnose.words import shape_in_words
 
 SHOWN = 12  # patterns listed at most
+JUMPS = "step: jumps between levels"
 CHANCE = 1e-4  # p-value, corrected for the number of tests, below which a pattern is shown
 
 
@@ -47,9 +48,9 @@ def _pattern(evidence: Evidence, channel, covariate, columns, score, chance) -> 
 def jump_patterns(evidence: Evidence) -> list[Pattern]:
     """Channels that rest on a level and jump to another: no covariate, but no noise either."""
     found, residual = [], evidence.ground.residual
-    for channel, gain in enumerate(jumps(residual)):
+    for channel, gain in enumerate(jumps(residual, evidence.ground.normal)):
         if gain > LIKELIER:
             rms = float(np.sqrt(np.mean(residual[channel] ** 2)))
             chance = float(max(np.exp(-gain), 1e-300))
-            found.append(Pattern(evidence.ground.axes[channel], "t_s", "step: jumps between levels", rms, chance))
+            found.append(Pattern(evidence.ground.axes[channel], "t_s", JUMPS, rms, chance))
     return found

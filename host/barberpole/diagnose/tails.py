@@ -11,6 +11,7 @@ GIANT = 12.0  # robust standard deviations
 RARE = 0.05  # of all readings may be giants
 REACH = 2  # samples on either side that an outlier is held against
 STEP = 9  # samples on either side of a possible jump; medians of nine pass over single outliers
+STEADY = 0.97  # cosine of the angle that a normal may turn in a step
 MAD = 1.4826  # of a normal distribution: standard deviation over median absolute deviation
 
 
@@ -45,16 +46,29 @@ def beside_neighbours(residual: np.ndarray) -> np.ndarray:
     return residual - np.median(around, axis=0)
 
 
-def jumps(residual: np.ndarray) -> np.ndarray:
+def jumps(residual: np.ndarray, normal: np.ndarray | None = None) -> np.ndarray:
     """Evidence (m,) for jumps between levels in residuals (m, n), whatever their colour.
 
-    Gaussian noise of any spectrum has Gaussian differences of medians; a signal that rests and jumps has not.
+    Gaussian noise of any spectrum has Gaussian differences of medians; a signal that rests and jumps has not. A scalar
+    residual jumps where its normal (3, n) turns, from the noise of one axis to that of another: only what lies between
+    turns counts.
     """
     n = residual.shape[1] // STEP
     if n < 4 * STEP:
         return np.zeros(residual.shape[0])
-    level = np.median(residual[:, : n * STEP].reshape(residual.shape[0], n, STEP), axis=2)
-    return np.array([two_populations(row) for row in np.diff(level, axis=1)])
+    change = np.diff(np.median(_in_steps(residual), axis=2), axis=1)
+    if normal is not None:
+        mean = _in_steps(normal).mean(axis=2)
+        change = change[:, np.sum(mean[:, 1:] * mean[:, :-1], axis=0) > STEADY]
+        if change.shape[1] < 4 * STEP:
+            return np.zeros(residual.shape[0])
+    return np.array([two_populations(row) for row in change])
+
+
+def _in_steps(rows: np.ndarray) -> np.ndarray:
+    """(m, n) -> (m, n / STEP, STEP)."""
+    n = rows.shape[1] // STEP
+    return rows[:, : n * STEP].reshape(rows.shape[0], n, STEP)
 
 
 def two_populations(x: np.ndarray) -> float:
