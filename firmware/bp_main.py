@@ -1,6 +1,5 @@
 # bp_main.py: power-up. Self-test, load what was in force, self-calibrate, judge, store, then stream.
-# The only file that knows `machine`; it makes the pins and the buses and hands them on. Ctrl-C ends it at any time:
-# coils at zero, flip pins low, back to the REPL without a word.
+# Ctrl-C ends it at any time: coils at zero, flip pins low, back to the REPL without a word.
 import binascii
 import os
 import sys
@@ -17,35 +16,11 @@ import bp_report as report
 import bp_selfcal
 import bp_store
 import bp_trajectory as trajectory
-from bp_ads131m08 import Ads131m08
-from bp_coils import Coils
-from bp_compensate import Compensator
-from bp_dac80504 import Dac80504
-from bp_flip import Flip
-from bp_sampler import Sampler
+from bp_hardware import Hardware
 
 FOLDER = "bp"  # below the working folder: /flash on a pyboard, / elsewhere
 RUN_FILE = FOLDER + "/run.bpr"
 _HALF_REPEAT = const(128)  # rows between header and verdict, which are said again for a host that joins later
-
-
-class Hardware:
-    def __init__(self):
-        set_pin = _output(board.SET_PIN, 0)
-        reset_pin = _output(board.RESET_PIN, 0)
-        self.flip = Flip(set_pin, reset_pin, board.PULSE_US, machine.disable_irq, machine.enable_irq)
-        dac_bus = machine.SPI(board.DAC_SPI, baudrate=board.DAC_BAUD, polarity=0, phase=1)
-        self.dac = Dac80504(dac_bus, _output(board.DAC_CS_PIN, 1))
-        self.coils = Coils(self.dac, board.DAC_CHANNELS, board.FULL_SCALE_MA)
-        adc_bus = machine.SPI(board.ADC_SPI, baudrate=board.ADC_BAUD, polarity=0, phase=1)
-        drdy = machine.Pin(board.ADC_DRDY_PIN, machine.Pin.IN)
-        self.adc = Ads131m08(adc_bus, _output(board.ADC_CS_PIN, 1), drdy, _output(board.ADC_RESET_PIN, 1))
-        self.sampler = Sampler(self.adc, self.flip, board)
-        self.compensator = Compensator(board, calibration)
-
-    def off(self):
-        self.flip.off()
-        self.coils.zero()
 
 
 class Clock:  # microseconds since it was made, from ticks that wrap
@@ -136,10 +111,6 @@ def stream(hardware, writer, clock, said):  # a row a cycle until Ctrl-C, or unt
         if rows % _HALF_REPEAT == 0:  # its check sum takes longer than a cycle: a row or two is left out
             kind, fields = said[rows // _HALF_REPEAT % 2]
             writer.json(kind, fields)
-
-
-def _output(name, value):
-    return machine.Pin(name, machine.Pin.OUT, value=value)
 
 
 def _self_calibrate(hardware, writer, clock):
