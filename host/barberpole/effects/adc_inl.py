@@ -71,18 +71,19 @@ def undo(xyz, p, at: Conditions):
     return tuple(sign * codes)
 
 
-def jacobian(xyz, p, at: Conditions):
-    """Slopes of (1) or (2)."""
+def joint(xyz, p, at: Conditions):
+    """(1) or (2) and its slopes."""
     codes, sign = _codes(xyz, at)
-    slope = error(codes, p)[1]
-    by_group = np.concatenate([value for value, _ in terms(codes, p)])
+    parts = terms(codes, p)
+    wrong, slope = error(codes, p, parts)
+    by_group = np.concatenate([value for value, _ in parts])
     if len(p) == 9:
-        return 1.0 + slope, sign * by_group
+        return np.asarray(xyz) + sign * wrong, 1.0 + slope, sign * by_group
     d_p = np.zeros((3, len(p), codes.shape[1]))
     for axis in range(3):
         d_p[axis, axis:-1:3] = by_group[axis::3]
         d_p[axis, -1] = -slope[axis] * codes[axis] / p[-1]
-    return 1.0 + slope, sign * d_p
+    return np.asarray(xyz) + sign * wrong, 1.0 + slope, sign * d_p
 
 
 def shapes(setup: Setup):
@@ -110,7 +111,7 @@ ADC_INL = Effect(
     params,
     forward,
     undo,
-    jacobian,
+    joint=joint,
     summary="the converter's codes are unevenly spaced",
     stage="reading",
     off_board="it acts on single codes, of which the board undoes the mean",

@@ -12,7 +12,8 @@ import numpy as np
 def terms(codes, p):
     """Pairs of what a parameter multiplies and its slope by the code, (3, n) each, in steps of three parameters."""
     if len(p) == 9:
-        return [(codes * _sign(codes), _sign(codes)), (codes**2, 2.0 * codes), (codes**3, 3.0 * codes**2)]
+        sign, square = np.copysign(1.0, np.real(codes)), codes * codes
+        return [(codes * sign, sign), (square, 2.0 * codes), (square * codes, 3.0 * square)]  # a power is slow
     found = []
     for h in range(1, (len(p) - 1) // 6 + 1):
         turn = 2.0 * np.pi * h / p[-1]
@@ -21,14 +22,11 @@ def terms(codes, p):
     return found
 
 
-def _sign(codes):
-    return np.where(np.real(codes) < 0.0, -1.0, 1.0)
-
-
-def error(codes, p):
-    """What the law adds to the codes (3, n), and its slope by the code."""
+def error(codes, p, parts=None):
+    """What the law adds to the codes (3, n), and its slope by the code. `parts`: their `terms`, where known."""
     groups = [np.asarray(p[j : j + 3])[:, None] for j in range(0, len(p) - len(p) % 3, 3)]
     total, slope = np.zeros(codes.shape), np.zeros(codes.shape)
-    for group, (value, steepness) in zip(groups, terms(codes, p), strict=True):
-        total, slope = total + group * value, slope + group * steepness
+    for group, (value, steepness) in zip(groups, parts or terms(codes, p), strict=True):
+        if np.any(group):
+            total, slope = total + group * value, slope + group * steepness
     return total, slope

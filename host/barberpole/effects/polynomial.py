@@ -50,4 +50,4 @@ def sums(p, u):
 def powers(p, u) -> Array:
     """(len(p), n): derivative of (1) by each coefficient, which acts on axis j % 3."""
     u = np.atleast_1d(np.asarray(u, float))
-    return np.stack([u ** (j // 3 + 1) for j in range(len(p))])
+    return np.repeat(np.cumprod(np.broadcast_to(u, (-(-len(p) // 3), u.size)), axis=0), 3, axis=0)[: len(p)]
