@@ -9,8 +9,6 @@ import bp_reasons as reasons
 
 CHANNELS = const(8)
 FRAME_BYTES = const(30)  # status, eight channels, check sum: ten words of 24 bits
-FIFO_FRAMES = const(2)  # old conversions that the chip still holds after a pause in reading it
-CLIP = const(0x7FFFFF)  # an input out of range reads as this code, or as its complement
 
 _REG_ID = const(0x00)
 _REG_MODE = const(0x02)
@@ -31,6 +29,8 @@ _TIMEOUT_US = const(5000)  # longest wait for a conversion: several periods at t
 
 class Ads131m08:
     def __init__(self, spi, cs, drdy, reset):
+        self.old_frames = 2  # conversions that the chip still holds after a pause in reading it
+        self.clip = 0x7FFFFF  # an input out of range reads as this code, or as its complement
         self._spi = spi
         self._cs = cs
         self._drdy = drdy

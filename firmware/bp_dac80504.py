@@ -1,6 +1,6 @@
 # bp_dac80504.py: four 16-bit voltages from the DAC80504.
 # Frames of 24 bits: read flag and register, then 16 bits of data, most significant first; mode 1.
-# write() allocates nothing. Fit the version that wakes at half scale (DAC80504M): half scale is no coil current.
+# write() allocates nothing. Strap RSTSEL high, so that it wakes at half scale: that is no coil current.
 from micropython import const
 
 import bp_reasons as reasons
@@ -10,6 +10,7 @@ _REG_GAIN = const(0x04)
 _REG_DAC0 = const(0x08)
 _READ = const(0x80)
 _ID = const(0x04)  # high byte of DEVICE ID: 16 bits, four channels
+_WAKES_AT_HALF = const(0x80)  # RSTSEL in DEVICE ID
 _GAIN_2 = const(0x000F)  # every output twice the reference
 
 
@@ -21,9 +22,16 @@ class Dac80504:
         self._in = bytearray(3)
 
     def start(self, gain):  # 1 or 2: output range in units of the reference
-        if self._read(_REG_ID) >> 8 != _ID:
+        found = self._read(_REG_ID)
+        if found >> 8 != _ID:
             raise reasons.Fault(reasons.WRONG_CHIP, "the coil driver is no DAC80504")
-        self._transfer(_REG_GAIN, _GAIN_2 if gain == 2 else 0)
+        if not found & _WAKES_AT_HALF:
+            raise reasons.Fault(reasons.WRONG_CHIP, "the DAC80504's RSTSEL pin is not strapped high")
+        # The GAIN pin is strapped to the board's gain and RSTSEL to half scale, so that the coils carry no current from
+        # power-up on (SBAS871C, 9.3.1.1). A write that changed the gain would be a pulse of half the full scale.
+        wanted = _GAIN_2 if gain == 2 else 0
+        if self._read(_REG_GAIN) & _GAIN_2 != wanted:
+            raise reasons.Fault(reasons.WRONG_CHIP, "the DAC80504's GAIN pin is not strapped as the board file says")
 
     def write(self, channel, code):
         self._transfer(_REG_DAC0 + channel, code)

@@ -6,7 +6,6 @@ from array import array
 
 from micropython import const
 
-import bp_ads131m08 as adc131
 import bp_reasons as reasons
 
 SET = const(0)  # sums[SET + axis]
@@ -15,6 +14,7 @@ BRIDGE = const(6)  # bridge voltage, one conversion a half cycle as all that fol
 COIL = const(7)  # sums[COIL + axis]
 SUPPLY = const(10)
 _ALL_AXES = const(0b111)
+FRAME_BYTES = const(30)  # what every converter's driver fills: status, eight channels, check sum, 24 bits each
 
 
 class Sampler:
@@ -25,14 +25,15 @@ class Sampler:
         self._half_us = board.HALF_US
         self.samples = board.SAMPLES_PER_HALF
         self._words = tuple(3 + 3 * channel for channel in board.ADC_CHANNELS)  # first byte of each in a frame
-        self._raw = bytearray(adc131.FRAME_BYTES * self.samples)
+        self._raw = bytearray(FRAME_BYTES * self.samples)
         view = memoryview(self._raw)
-        self._frames = tuple(view[at : at + adc131.FRAME_BYTES] for at in range(0, len(self._raw), adc131.FRAME_BYTES))
-        self._old = bytearray(adc131.FRAME_BYTES)
+        self._frames = tuple(view[at : at + FRAME_BYTES] for at in range(0, len(self._raw), FRAME_BYTES))
+        self._old = bytearray(FRAME_BYTES)
         self._next_us = time.ticks_us()
         self.sums = array("i", bytearray(4 * 11))
         self.mid_us = 0  # ticks of the last RESET pulse, the middle of the last cycle
         self.cycles = 0
+        self.lost = 0  # flip cycles that went by without a row; none can here, the next one just comes later
         self.clipped = 0  # a bit for each axis that reached the end of the converter
         self._moving = 0  # a bit for each axis whose samples differ at all
 
@@ -40,6 +41,11 @@ class Sampler:
         for i in range(11):
             self.sums[i] = 0
         self.cycles = self.clipped = self._moving = 0
+
+    def fresh(
+        self,
+    ):  # what was sampled before this moment does not count: here nothing is sampled before it is asked for
+        pass
 
     def cycle(self):
         self._wait_for_turn()
@@ -67,7 +73,7 @@ class Sampler:
 
     def _half(self, first):
         time.sleep_us(self._settle_us)
-        for _ in range(adc131.FIFO_FRAMES):
+        for _ in range(self._adc.old_frames):
             self._adc.read_into(self._old)
         for frame in self._frames:
             self._adc.read_into(frame)
@@ -78,8 +84,9 @@ class Sampler:
 
     def _sum_axis(self, axis, first):
         raw = self._raw
-        total, low, high = 0, adc131.CLIP, -adc131.CLIP
-        i, end, step = self._words[axis], len(raw), adc131.FRAME_BYTES
+        clip = self._adc.clip
+        total, low, high = 0, clip, -clip
+        i, end, step = self._words[axis], len(raw), FRAME_BYTES
         while i < end:  # a range with a step from elsewhere would be an object on the heap
             word = raw[i] << 16 | raw[i + 1] << 8 | raw[i + 2]
             if word & 0x800000:
@@ -91,7 +98,7 @@ class Sampler:
                 high = word
             i += step
         self.sums[first + axis] += total
-        if low <= -adc131.CLIP or high >= adc131.CLIP:
+        if low <= -clip or high >= clip:
             self.clipped |= 1 << axis
         if low < high:
             self._moving |= 1 << axis

@@ -54,6 +54,7 @@ def measure(points, sampler, coils, compensator, trajectory, board):  # fills po
 
 
 def _average(sampler, board):
+    sampler.fresh()
     for _ in range(board.SETTLE_CYCLES):
         sampler.cycle()
     sampler.clear()

@@ -31,6 +31,7 @@ REASON = {
     "adc_stuck": "adc_stuck",
     "adc_silent": "adc_silent",
     "wrong_chip": "wrong_chip",
+    "dac_silent": "wrong_chip",
     "ambient_step": "ambient_step",
     "supply_low": "supply_low",
 }
@@ -100,6 +101,12 @@ def test_board_in_float32_and_host_in_double_agree_on_the_same_points(board, cal
     found = verify(read_log(tmp_path / "run.bpr"), calibration)
     assert found.passed, found.to_json()
     assert found.to_json()["board_against_host_ppm"] < 10.0
+
+
+def test_a_board_without_its_coil_driver_streams(board, tmp_path):
+    assert names(power_up(board, faults=("dac_silent",))) == ["wrong_chip"]
+    record(board.port, tmp_path / "log.bpr", frames=20)
+    assert read_log(tmp_path / "log.bpr").n >= 15
 
 
 def test_a_host_that_joins_later_reads_the_stream(board, calibration, tmp_path):

@@ -13,6 +13,7 @@ FAULTS = {
     "coil_short_z": "the z coil is shorted: the current flows past it, larger than commanded",
     "adc_stuck": "every conversion of the ADC repeats the first one",
     "adc_silent": "the ADC answers and keeps its registers, but no conversion ever comes",
+    "dac_silent": "the DAC does not answer on its bus",
     "wrong_chip": "the ADC answers with the identity of another part",
     "ambient_step": "the ambient field jumps while the coils are first driven",
     "supply_low": "the strap supply is at 60 %: its pulses do not flip the bridges",

@@ -56,7 +56,8 @@ class Soldered:
         for chip, table in ((self._adc, board.adc), (self._dac, board.dac)):
             pin = PINS.index(table.cs_pin)
             self._selected[pin] = False
-            self._buses[bus_number(table.spi)].append((pin, chip))
+            if chip is self._adc or "dac_silent" not in self.faults:
+                self._buses[bus_number(table.spi)].append((pin, chip))
             self._on_pin[pin] = partial(self._select, pin, chip)
 
     def pin(self, t_us: int, pin: int, level: int) -> None:

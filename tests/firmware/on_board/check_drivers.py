@@ -78,13 +78,19 @@ def check_chip_select_is_released_on_error():
 
 
 def check_dac_frames():
-    spi = Spi([bytes(3), b"\x00\x04\x15"])
+    spi = Spi([bytes(3), b"\x00\x04\x97", bytes(3), b"\x00\x00\x0f"])
     dac = Dac80504(spi, Pin(1))
     dac.start(2)
-    assert spi.written == [b"\x81\x00\x00", b"\x00\x00\x00", b"\x04\x00\x0f"], spi.written
+    assert spi.written == [b"\x81\x00\x00", b"\x00\x00\x00", b"\x84\x00\x00", b"\x00\x00\x00"], spi.written
     dac.write(2, 0xABCD)
     assert spi.written[-1] == b"\x0a\xab\xcd"
     assert raises(reasons.Fault, Dac80504(Spi(), Pin(1)).start, 2).code == reasons.WRONG_CHIP
+
+
+def check_dac_never_changes_its_gain():  # that would be a pulse of current through every coil
+    spi = Spi([bytes(3), b"\x00\x04\x97", bytes(3), bytes(3)])
+    assert raises(reasons.Fault, Dac80504(spi, Pin(1)).start, 2).code == reasons.WRONG_CHIP
+    assert not [frame for frame in spi.written if frame[0] == 4]
 
 
 def check_dac_write_allocates_nothing():

@@ -31,6 +31,9 @@ class Spi:  # answers with the frames it was given, and keeps what was written
 
 
 class Adc:  # conversions without a bus: words(channel, state) gives the code; state follows the flip pins
+    old_frames = 2
+    clip = 0x7FFFFF
+
     def __init__(self, words):
         self._words = words
         self.state = 0
