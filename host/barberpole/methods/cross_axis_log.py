@@ -26,7 +26,7 @@ def cross_axis_search(log: Log, given: Given) -> Answer:
     seen = scalar(log, WHAT)
     otherwise_ut = float(given.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     known = one_magnitude(seen, otherwise_ut, WHAT, log.path)
-    require_seen(seen, known)
+    require_seen(seen, known, log.path)
     hk = np.array(given.sensor.anisotropy_field_ut if given.sensor else ANISOTROPY_UT)
     easy = given.sensor.easy_axis_index if given.sensor else seen.at.easy_axis
     require_anisotropy(hk, known)

@@ -20,7 +20,7 @@ from barberpole.fitted import from_calibration
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
 from barberpole.methods.linear import linear_model, require_followed
-from barberpole.methods.readings import demodulated
+from barberpole.methods.readings import demodulated, require_regular
 
 WHAT = "the offset-coil method"
 LINEAR_ONLY = {"bias", "scale", "misalignment", "soft_iron"}
@@ -63,6 +63,7 @@ def offset_coil(log: Log, given: Given) -> Answer:
         raise InputError(must(WHAT, "given currents in all three coils", "fewer coils driven", log.path))
     ut_per_ma = given.sensor.offset_coil_ut_per_ma if given.sensor else NOMINAL_UT_PER_MA
     coil_ut = ut_per_ma * seen.at.i_ma
+    require_regular(seen.y, coil_ut, log.path)
     found = linear_model(seen.y, coil_ut)
     require_followed(found, seen.y, coil_ut, "the coil currents", log.path)
     coil = Affine(found.matrix, -found.matrix @ found.offset_lsb)

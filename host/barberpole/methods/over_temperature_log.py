@@ -11,6 +11,7 @@ from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given
 from barberpole.methods.ellipsoid import efficient
+from barberpole.methods.guards import LEAST_ROWS, require_rows
 from barberpole.methods.linear import linear_model
 from barberpole.methods.over_temperature import DEGREE_A, OverTemperature, over_temperature, values_of
 from barberpole.methods.readings import one_magnitude, scalar, vector
@@ -43,6 +44,7 @@ def temperature(log: Log, given: Given) -> Answer:
     if np.ptp(temp) < STEADY_K:
         got = f"{temp.min():.1f} to {temp.max():.1f} °C"
         raise InputError(must(WHAT, "given a range of temperatures (or many logs: calibrate-over-temperature)", got))
+    require_rows(log.n, PIECES * LEAST_ROWS, WHAT, log.path)
     order = np.argsort(temp, kind="stable")
     edges = np.linspace(0, log.n, PIECES + 1).astype(int)
     parts = [log.take(np.sort(order[a:b])) for a, b in pairwise(edges)]
@@ -66,5 +68,5 @@ def _shape(log: Log, given: Given) -> Ellipsoid:
     seen = scalar(log, WHAT)
     otherwise_ut = float(given.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     known = one_magnitude(seen, otherwise_ut, WHAT, log.path)
-    require_seen(seen, known)
+    require_seen(seen, known, log.path)
     return efficient(seen.y, known)

@@ -15,7 +15,7 @@ import numpy as np
 from barberpole.errors import InputError, must
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, per_axis, value
-from barberpole.methods.linear import decompose, linear_model
+from barberpole.methods.linear import decompose, linear_model, require_followed
 from barberpole.methods.readings import vector
 
 WHAT = "the polynomial method"
@@ -106,9 +106,10 @@ def choose(reading: np.ndarray, field_ut: np.ndarray, most: int = MOST) -> tuple
 def polynomial(log: Log, given: Given) -> Answer:
     """The method on a log with an applied field. Raises InputError where the field is not known or does not span."""
     seen, field_ut = vector(log, WHAT, 3 * MOST + 1)
+    line = linear_model(seen.y, field_ut)
+    require_followed(line, seen.y, field_ut, "the applied field", log.path)
     degrees, errors = choose(seen.y, field_ut)
     found = polynomial_model(seen.y, field_ut, degrees)
-    line = linear_model(seen.y, field_ut)
     before, after = (np.sqrt(np.mean((f.field(seen.y) - field_ut) ** 2)) for f in (line, found))
     note = f"m = {degrees[0]}, n = {degrees[1]} by held-out error"
     values = _values(found) | {

@@ -12,6 +12,7 @@ from barberpole.fit.observability import covariance
 from barberpole.fit.residual import Problem
 from barberpole.fit.start import Linear, start_values
 from barberpole.log import Log
+from barberpole.methods.guards import require_moving, require_no_spikes
 from barberpole.model import compose
 from barberpole.observations import Observations, observations
 
@@ -28,6 +29,7 @@ def demodulated(log: Log, what: str) -> Observations:
     if (1.0 in states and -1.0 in states) or not log.has(*READINGS):
         got = "SET and RESET in turns in x_lsb.. (fit without --method takes them)"
         raise InputError(must(what, "given demodulated readings", got, log.path))
+    require_moving(seen.y, what, log.path)
     return seen
 
 
@@ -58,7 +60,18 @@ def vector(log: Log, what: str, parameters: int) -> tuple[Observations, np.ndarr
     if seen.b_ut is None:
         raise InputError(must(what, "given the applied field bx_ut, by_ut, bz_ut", "a log without it", log.path))
     _require_span(seen.b_ut, what, parameters, log.path)
+    require_regular(seen.y, seen.b_ut, log.path)
     return seen, seen.b_ut
+
+
+def require_regular(reading: np.ndarray, field_ut: np.ndarray, where: object) -> None:
+    """Raise InputError where spikes rule a fit of readings (3, n) and known fields (3, n).
+
+    The readings are regressed on the field, which is free of errors, so that a spike cannot hide by its leverage.
+    """
+    columns = np.vstack([field_ut, np.ones(field_ut.shape[1])]).T
+    left = reading.T - columns @ np.linalg.lstsq(columns, reading.T, rcond=None)[0]
+    require_no_spikes(left.T, float(np.max(np.ptp(reading, axis=1))), where)
 
 
 def _require_span(field_ut: np.ndarray, what: str, parameters: int, where: object) -> None:

@@ -5,19 +5,17 @@ from collections.abc import Callable
 import numpy as np
 
 from barberpole.errors import InputError
-from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, Fit
+from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
 from barberpole.fit.start import Linear
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
 from barberpole.methods.ellipsoid import Ellipsoid, algebraic, coverage_message, cramer_rao, efficient
+from barberpole.methods.guards import LEAST_ROWS, noise_lsb, require_determined, require_no_spikes, require_rows
 from barberpole.methods.iterative import iterative
 from barberpole.methods.readings import LINEAR_EFFECTS, judged, one_magnitude, scalar
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations
 
-GAIN_RATIO = 8.0  # between the axes of one sensor; more is a flat cloud drawn out into a sphere
-GAIN_STDERR = 0.05  # relative standard error of a gain above which the surface was not seen
-FILLED = 20.0  # %, RMS of |H|/K - 1: a ball of noise has 42, an evenly filled one 26, a bad real log 3
 WHAT = "an ellipsoid fit"
 
 
@@ -64,15 +62,15 @@ def _answer(log: Log, given: Given, shape_of: Callable) -> tuple[Answer, Observa
     seen = scalar(log, WHAT)
     otherwise_ut = float(given.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     known = one_magnitude(seen, otherwise_ut, WHAT, log.path)
+    require_seen(seen, known, log.path)
     shape = shape_of(seen.y, known)
     fit = judged(Linear(np.linalg.inv(shape.upper), shape.centre, known), seen, known)
-    _require_certain(fit, seen)
-    return Answer(_values(shape, seen, known, fit.rms_lsb), fit, file), seen, known
+    return Answer(_values(shape, seen, known), fit, file), seen, known
 
 
-def _values(shape: Ellipsoid, seen: Observations, known: float, sigma_lsb: float) -> Values:
+def _values(shape: Ellipsoid, seen: Observations, known: float) -> Values:
     """L of 4.18 in µT/LSB, b of 4.20 in LSB, with the standard errors that the residual implies."""
-    stderr = np.sqrt(np.diag(cramer_rao(seen.y, shape, known, sigma_lsb)))
+    stderr = np.sqrt(np.diag(cramer_rao(seen.y, shape, known, noise_lsb(shape, seen.y, known))))
     upper = np.zeros((3, 3))
     upper[np.triu_indices(3)] = stderr[:6]
     return (
@@ -87,17 +85,9 @@ def _misfit_rms(shape: Ellipsoid, seen: Observations, known: float) -> float:
     return float(np.sqrt(np.mean((np.linalg.norm(shape.field(seen.y), axis=0) - known) ** 2)))
 
 
-def _require_certain(fit: Fit, seen: Observations) -> None:
-    """Refuse an ellipsoid that the data only suggest: a cloud filled, a flat one drawn out, gains of no certainty."""
-    gains = {n: (v, s) for n, v, s in zip(fit.model.names, fit.p, fit.stderr, strict=True) if n.startswith("scale.")}
-    values = np.abs([v for v, _ in gains.values()])
-    worst = max(s / abs(v) for v, s in gains.values())
-    filled = (fit.rms_norm_percent() or 0.0) > FILLED
-    if filled or values.max() > GAIN_RATIO * values.min() or worst > GAIN_STDERR:
-        raise InputError(coverage_message(seen.y))
-
-
-def require_seen(seen: Observations, known: float) -> None:
-    """Raise InputError where readings in a field of one magnitude do not determine an ellipsoid."""
+def require_seen(seen: Observations, known: float, where: object = "") -> None:
+    """Raise InputError where readings in a field of one magnitude do not determine an ellipsoid, or spikes rule it."""
+    require_rows(seen.y.shape[1], LEAST_ROWS, WHAT, where)
     shape = algebraic(seen.y, known)
-    _require_certain(judged(Linear(np.linalg.inv(shape.upper), shape.centre, known), seen, known), seen)
+    require_no_spikes(np.linalg.norm(shape.field(seen.y), axis=0) - known, known, where)
+    require_determined(shape, seen.y, known)

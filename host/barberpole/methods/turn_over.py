@@ -13,6 +13,7 @@ import numpy as np
 from barberpole.errors import InputError, must
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, per_axis
+from barberpole.methods.guards import require_moving
 from barberpole.methods.readings import demodulated
 
 WHAT = "the turn-over method"
@@ -71,8 +72,9 @@ def turn_over_log(log: Log, given: Given) -> Answer:
     if not log.has(COLUMN):
         wanted = f"given a column {COLUMN}: 0 as normal, 1, 2, 3 after 180° about x, y, z"
         raise InputError(must(WHAT, wanted, "a log without it", log.path))
-    found = turn_over(demodulated(log, WHAT).y, log[COLUMN])
-    return Answer(_values(found))
+    reading = demodulated(log, WHAT).y
+    require_moving(reading, WHAT, log.path, every=True)
+    return Answer(_values(turn_over(reading, log[COLUMN])))
 
 
 def _values(found: TurnOver) -> Values:
