@@ -10,7 +10,7 @@ import typer
 
 import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, so it comes first)
 from barberpole import __version__
-from barberpole.commands import board, calibrate, catalogue, characterise, demo, design, methods, trajectory
+from barberpole.commands import board, calibrate, catalogue, challenge, characterise, demo, design, methods, trajectory
 from barberpole.errors import BarberpoleError, must
 
 interrupt.loaded()
@@ -31,6 +31,7 @@ characterise.register(app)
 board.register(app)
 trajectory.register(app)
 design.register(app)
+challenge.register(app)
 demo.register(app)
 
 

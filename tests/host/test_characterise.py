@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from barberpole.challenge import noise
 from barberpole.characterise.angles import alignment_error_deg, heading_deg, heading_error_deg, noise_angle_deg
 from barberpole.characterise.kinds import kind
 from barberpole.characterise.noise import noise_figures, outliers
@@ -16,7 +17,6 @@ from barberpole.cli import run as command
 from barberpole.errors import InputError
 from barberpole.log import Log, read_log, write_log
 from barberpole.trajectory.programs import FREQUENCIES_HZ, frequency_program, lin_60000, turn_over_program
-from truth import noise
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 GAIN_NT = np.array([65.7, 65.7, 73.0])  # nT/LSB of an HMC5983, article table 1

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from barberpole.challenge.record import Recipe, record
 from barberpole.diagnose import Comparison, compare
 from barberpole.fit.fit import fit_log
-from truth.record import Recipe, record
 from truth.trials import BASE, log_of, model_of
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from barberpole.adding import change
+from barberpole.challenge.record import Recipe, record, rest
 from barberpole.diagnose import Diagnosis, diagnose, diagnose_observations
 from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.resting import longest_rest, noise_of
 from barberpole.log import read_log
 from barberpole.observations import observations
-from truth.record import Recipe, record, rest
 from truth.trials import BASE, confusion, judge, log_of, model_of, rates, trials
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from barberpole.challenge.record import Recipe, record
 from barberpole.errors import InputError
 from barberpole.fit.ellipsoid import algebraic
 from barberpole.fit.fit import Fit, fit_log
-from truth.record import Recipe, record
 from truth.trials import BASE, log_of, model_of
 
 NOISE_LSB = 2.0  # of every recipe here: 0.2 µT at 10 LSB/µT
@@ -109,3 +109,11 @@ def test_effects_that_say_the_same_are_frozen_and_named_and_the_fit_stays_on_cou
     assert both.converged
     assert set(both.unobservable) == {"soft_iron.xy", "soft_iron.xz", "soft_iron.yz"}
     assert both.heldout_rms_lsb == pytest.approx(one.heldout_rms_lsb, rel=1e-6)
+
+
+def test_a_strong_saturation_shows_through_heavy_noise():
+    """Its standard error is several times what a clean sensor shows, and its value many standard errors."""
+    log = log_of(record(Recipe({"saturation": 1.0}, noise_ut=2.0, form="demodulated", seed=4_000_501)))
+    fit = fit_log(log, model_of((*BASE, "saturation")))
+    assert fit.rms_lsb < 1.02 * 20.0 * 1.08  # the gains of that sensor are up to 8 % above the ten of the recipe
+    assert all(value > 0 for name, value in zip(fit.model.names, fit.p, strict=True) if "saturation" in name)

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from barberpole.challenge.motion import directions, planar
+from barberpole.challenge.world import domain
 from barberpole.errors import InputError
 from barberpole.fit.fit import fit_log
 from barberpole.log import Log
@@ -13,8 +15,6 @@ from barberpole.methods.ellipsoid import Ellipsoid, algebraic, cramer_rao, effic
 from barberpole.methods.iterative import iterative
 from barberpole.methods.registry import METHODS, find_method
 from barberpole.modelfile import read_model
-from truth.motion import directions, planar
-from truth.world import domain
 
 K_UT, SIGMA_UT = 50.0, 0.1
 TRUE = Ellipsoid(np.array([[1.02, 0.03, -0.02], [0.0, 0.97, 0.04], [0.0, 0.0, 1.05]]), np.array([12.0, -7.0, 20.0]))

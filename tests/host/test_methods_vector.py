@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from barberpole.calibrating import calibration_of
+from barberpole.challenge.motion import planar
 from barberpole.cli import run as command
 from barberpole.errors import InputError
 from barberpole.fit.fit import fit_log
@@ -17,7 +18,6 @@ from barberpole.methods.polynomial import choose, polynomial_model
 from barberpole.methods.registry import find_method
 from barberpole.modelfile import read_model
 from barberpole.trajectory.programs import lin_60000
-from truth.motion import planar
 
 M = np.array([[0.066, 0.002, -0.001], [0.003, 0.064, 0.009], [-0.002, 0.001, 0.073]])  # µT/LSB, as of an HMC5983
 STRAIGHT = np.diag(np.diag(M))  # axes at right angles: with bent ones the cubic shows in the cross-field terms too

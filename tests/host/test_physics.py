@@ -167,10 +167,12 @@ def test_saturation_is_a_tangent_and_begins_as_a_cubic():
 @pytest.mark.parametrize(("name", "powers"), [("quadratic", 2), ("cubic", 3)])
 def test_polynomials_are_undone_to_their_roots(name: str, powers: int):
     effect = find_effect(name)
-    for bound in (0.98, -0.98):
-        p = [bound * q.upper for q in effect.params(Setup(span_ut=50.0))]
-        y = np.linspace(-55, 55, 23)
+    for bound in ("lower", "upper"):
+        p = [0.98 * getattr(q, bound) for q in effect.params(Setup(span_ut=50.0))]
+        x = np.linspace(-40, 40, 23)  # the largest field seen is 50 / 1.5
+        y = x + p[0] * x**powers
         found = np.asarray(effect.undo((y, y, y), p, Conditions()))[0]
+        assert np.max(np.abs(found - x)) < 1e-11
         for value, x in zip(y, found, strict=True):
             roots = np.roots([p[0]] + [0.0] * (powers - 2) + [1.0, -value])
             assert np.min(np.abs(roots - x)) < 1e-11

@@ -1,1 +1,1 @@
-"""An independent truth: exact physics and distortions written by hand, sharing no code with barberpole.effects."""
+"""Hidden-effect trials of the diagnosis, on the independent truth of barberpole.challenge."""

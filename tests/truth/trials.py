@@ -12,12 +12,11 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from barberpole.challenge.record import Recipe, record, rest
+from barberpole.challenge.world import CATALOGUE, FOREIGN
 from barberpole.diagnose import Diagnosis, diagnose
 from barberpole.log import Log
 from barberpole.modelfile import ModelFile
-
-from .record import Recipe, record, rest
-from .world import CATALOGUE, FOREIGN
 
 BASE = ("bias", "scale", "misalignment")
 NEEDS_FLIPS = ("flip_asymmetry",)

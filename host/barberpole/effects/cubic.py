@@ -15,9 +15,9 @@ STEPS = 3  # of Halley's method, which triples the digits: from 4e-3 to below ro
 
 
 def params(setup: Setup):
-    """c in 1/µT², bounded so that (1) stays rising over one and a half of the span."""
+    """c in 1/µT², bounded so that (1) stays rising over 1.29 times the largest field seen, of which the span is 1.5."""
     span = setup.span_ut * setup.span_ut
-    return per_axis("1/uT^2", lower=-0.1 / span, upper=0.1 / span, typical=0.005 / span)
+    return per_axis("1/uT^2", lower=-0.45 / span, upper=1.0 / span, typical=0.005 / span)
 
 
 def forward(xyz, p, at: Conditions):

@@ -13,7 +13,7 @@ from barberpole.effects.effect import Conditions, Effect, Setup, per_axis
 
 def params(setup: Setup):
     """q in 1/µT, bounded so that (1) stays rising over one and a quarter of the span."""
-    return per_axis("1/uT", lower=-0.2 / setup.span_ut, upper=0.2 / setup.span_ut, typical=0.005 / setup.span_ut)
+    return per_axis("1/uT", lower=-0.4 / setup.span_ut, upper=0.4 / setup.span_ut, typical=0.005 / setup.span_ut)
 
 
 def forward(xyz, p, at: Conditions):

@@ -14,9 +14,9 @@ from barberpole.effects.effect import Conditions, Effect, Setup, Shape, per_axis
 
 
 def params(setup: Setup):
-    """v = 1/L² in 1/µT²: L is at least the span."""
+    """v = 1/L² in 1/µT²: L is at least three quarters of the largest field seen (the span is one and a half)."""
     span = setup.span_ut * setup.span_ut
-    return per_axis("1/uT^2", lower=0.0, upper=1.0 / span, typical=0.01 / span)
+    return per_axis("1/uT^2", lower=0.0, upper=4.0 / span, typical=0.01 / span)
 
 
 def forward(xyz, p, at: Conditions):

@@ -210,7 +210,7 @@ def believable(residual: np.ndarray, limit: float = OUTLIER) -> np.ndarray:
 
 def _freeze_undetermined(model: Model, solution: Solution, keep: np.ndarray) -> None:
     """Take parameters out of the mask `keep`, the worst first, until all are determined."""
-    while (worst := observability.undetermined(model, solution.gram, keep)) is not None:
+    while (worst := observability.undetermined(model, solution.gram, keep, solution.p)) is not None:
         keep[worst] = False
 
 

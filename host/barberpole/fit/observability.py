@@ -7,7 +7,7 @@ from barberpole.model import Model
 
 RANK = 1e-10  # squared sine of the angle to the earlier parameters' columns below which a column adds nothing
 USELESS = 3.0  # a standard error this many times the size a real sensor shows says nothing about it
-
+SHOWN = 5.0  # standard errors from its null at which a parameter shows all the same, however noisy the log
 
 BASIC = ("bias", "scale", "misalignment")  # what every sensor has keeps its parameters where others could take them
 
@@ -50,11 +50,16 @@ def covariance(gram: Gram, free: np.ndarray) -> np.ndarray:
     return out
 
 
-def undetermined(model: Model, gram: Gram, free: np.ndarray) -> int | None:
-    """The free parameter least determined, if its standard error exceeds what a real sensor could show; else None."""
+def undetermined(model: Model, gram: Gram, free: np.ndarray, p: np.ndarray) -> int | None:
+    """The free parameter least determined, if its standard error exceeds what a real sensor could show; else None.
+
+    One of p (P,) that stands clear of its null is determined, unless it is of the basic ones, which hide in each other.
+    """
     stderr = np.sqrt(np.maximum(np.diag(covariance(gram, free)), 0.0))
     typical = np.array([abs(q.typical) if q.typical else np.inf for q in model.params])
-    ratio = np.where(free, stderr / typical, 0.0)
+    basic = np.array([name.split(".")[0] in BASIC for name in model.names], bool)
+    shown = ~basic & (np.abs(p - model.null) > SHOWN * stderr)
+    ratio = np.where(free & ~shown, stderr / typical, 0.0)
     worst = int(np.argmax(ratio))
     return worst if ratio[worst] > USELESS else None
 

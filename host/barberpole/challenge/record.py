@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from . import motion, noise
-from .world import Hidden, Scene, reading, strength_for
+from barberpole.challenge import motion, noise
+from barberpole.challenge.world import Hidden, Scene, reading, strength_for
 
 FS_HZ = 40.0
 REST_S = 60.0
