@@ -3,6 +3,7 @@
 import numpy as np
 
 from barberpole.diagnose.covariates import Covariate
+from barberpole.numbers import plain
 
 ODD = ("linear", "cubic")
 
@@ -45,8 +46,8 @@ def _peak(series: np.ndarray) -> str:
 
 
 def _figure(value: float) -> str:
-    """Two figures; three from 100 on, never an exponent below 10 000."""
-    return f"{value:.3g}" if 100 <= abs(value) < 1e4 else f"{value:.2g}"
+    """Two figures; three from 100 on, an exponent from a million on."""
+    return plain(value, 3 if abs(value) >= 100 else 2)
 
 
 def _signed(value: float) -> str:

@@ -1,0 +1,87 @@
+"""Does the error fall with each effect that is added, and how far is it from the noise?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from barberpole.calibration import Step
+from barberpole.diagnose import Diagnosis
+from barberpole.figures.figure import Figure, noise_line, plot
+from barberpole.figures.theme import AFTER, BEFORE, BLUE, DECADES
+from barberpole.numbers import plain
+
+LOGARITHMIC = 8.0  # times the noise: a larger fall needs a logarithmic axis
+FLOOR = 1.1  # times the noise: an error below it is at the floor
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A model on the path: what was done to reach it, and the errors in LSB it leaves."""
+
+    name: str
+    heldout_lsb: float
+    rms_lsb: float
+
+
+def stages_of_history(history: Sequence[Step], first: str = "first model") -> list[Stage]:
+    """The path of a calibration."""
+    names = [f"+ {s.added}" if s.added else f"− {s.removed}" if s.removed else first for s in history]
+    return [
+        Stage(n, s.rms_lsb if s.heldout_rms_lsb is None else s.heldout_rms_lsb, s.rms_lsb)
+        for n, s in zip(names, history, strict=True)
+    ]
+
+
+def stages_of_diagnosis(found: Diagnosis) -> list[Stage]:
+    """The model given, then with each suspect put in."""
+    names = ["model", *(f"+ {s.effect}" for s in found.suspects)]
+    return [Stage(n, f.heldout_rms_lsb, f.rms_lsb) for n, f in zip(names, found.fits, strict=False)]
+
+
+def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
+    """Held-out error after each stage, the falls between them, and the noise floor."""
+    left = np.array([s.heldout_lsb for s in stages])
+    steep = np.isfinite(noise_lsb) and left.max() > LOGARITHMIC * max(noise_lsb, 1e-300)
+    figure = plot("", "held-out error, LSB rms", 340)
+    names = [f"{at}: {s.name}" if at else s.name for at, s in enumerate(stages)]
+    change = left[1:] - left[:-1]
+    figure.add_bar(
+        x=names[1:],
+        y=np.abs(change),
+        base=np.minimum(left[1:], left[:-1]),
+        width=0.28,
+        marker={"color": [AFTER if c < 0 else BEFORE for c in change], "opacity": 0.55},
+        text=[f"{100 * c / b:+.0f} %" for c, b in zip(change, left[:-1], strict=True)],
+        hoverinfo="skip",
+        showlegend=False,
+    )
+    figure.add_scatter(
+        x=names,
+        y=left,
+        mode="markers+text",
+        text=[plain(v) for v in left],
+        textposition="middle right",
+        marker={"color": BLUE, "size": 10, "symbol": "diamond"},
+        cliponaxis=False,
+        showlegend=False,
+    )
+    figure.update_xaxes(categoryorder="array", categoryarray=names, range=[-0.5, len(names) - 0.3])
+    if steep:
+        figure.update_yaxes(type="log", **DECADES)
+    else:
+        figure.update_yaxes(rangemode="tozero")
+    if np.isfinite(noise_lsb):
+        noise_line(figure, noise_lsb, logarithmic=bool(steep))
+    return Figure(figure, *_words(stages, noise_lsb))
+
+
+def _words(stages: Sequence[Stage], noise: float) -> tuple[str, str]:
+    first, last = stages[0].heldout_lsb, stages[-1].heldout_lsb
+    path = ", ".join(f"{s.name} {plain(s.heldout_lsb)}" for s in stages)
+    sentence = f"Error on stretches never fitted, LSB rms: {path}; noise floor {plain(noise)}."
+    reached = " to the noise floor" if last < FLOOR * noise else ""
+    if len(stages) == 1:
+        return (f"The error is {'at' if reached else f'{plain(last / noise, 3)} times'} the noise floor", sentence)
+    verb = "falls" if last < first else "rises"
+    return f"The error {verb} from {plain(first)} to {plain(last)} LSB{reached}", sentence

@@ -1,0 +1,32 @@
+"""Numbers as people read them."""
+
+import math
+
+
+def plain(value: float, digits: int = 4) -> str:
+    """Significant figures without an exponent from 0.0001 up to a million: 303200, 0.00123, 1.2e+09."""
+    if value is None or not math.isfinite(value):
+        return "not known"
+    if value == 0:
+        return "0"
+    rounded = float(f"{value:.{digits - 1}e}")
+    if not 1e-4 <= abs(rounded) < 1e6:
+        return f"{value:.{digits}g}"
+    after = max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)
+    text = f"{rounded:.{after}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def signed(value: float, digits: int = 3) -> str:
+    """The same with its sign: +38, -0.2."""
+    return plain(value, digits) if value < 0 or not math.isfinite(value) else f"+{plain(value, digits)}"
+
+
+def uncertain(value: float, stderr: float) -> str:
+    """A value to the digits that its error leaves: "65.72 ± 0.03"."""
+    if not math.isfinite(stderr) or stderr <= 0:
+        return plain(value)
+    digits = max(0, 1 - math.floor(math.log10(stderr)))
+    if digits > 7:
+        return f"{value:.6g} ± {stderr:.2g}"
+    return f"{value:.{digits}f} ± {stderr:.{digits}f}"
