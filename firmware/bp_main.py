@@ -98,7 +98,7 @@ def self_test(hardware):  # codes of what forbids a self-calibration, whether sa
 
 def stream(hardware, writer, clock, said):  # a row a cycle until Ctrl-C, or until the converter falls silent
     sampler = hardware.sampler
-    clipped = rows = 0
+    clipped = rows = lost = 0
     while True:
         sampler.clear()
         try:
@@ -109,6 +109,9 @@ def stream(hardware, writer, clock, said):  # a row a cycle until Ctrl-C, or unt
         if sampler.clipped and not clipped:
             report.event(writer, clock.now_s(), reasons.SATURATED)
         clipped = sampler.clipped
+        if sampler.lost != lost:
+            report.event(writer, clock.now_s(), reasons.SAMPLES_LOST, "%d flip cycles" % (sampler.lost - lost))
+            lost = sampler.lost
         writer.frame(records.ROW, report.row(sampler, hardware.compensator, clock.at_us(sampler.mid_us)))
         rows += 1
         if rows % _HALF_REPEAT == 0:  # its check sum takes longer than a cycle: a row or two is left out

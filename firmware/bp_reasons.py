@@ -19,6 +19,8 @@ INTERRUPTED = const(13)
 SHADOWED = const(14)
 OUT_OF_RANGE = const(15)
 STORE_FAILED = const(16)
+FLIP_STOPPED = const(17)
+SAMPLES_LOST = const(18)
 
 # name and sentence by code
 TABLE = (
@@ -39,6 +41,8 @@ TABLE = (
     ("shadowed", "A stray file hides a module of the same name in the firmware."),
     ("out_of_range", "A reading lies outside the range in which the model can be undone."),
     ("store_failed", "The flash did not take a file: what was in force stays in force."),
+    ("flip_stopped", "The break input has stopped the flip pulses."),
+    ("samples_lost", "Flip cycles went by unread: a pause was longer than the ring of samples is deep."),
 )
 
 

@@ -44,6 +44,11 @@ TABLE = tuple(
             ("shadowed", "A stray file hides a module of the same name in the firmware."),
             ("out_of_range", "A reading lies outside the range in which the model can be undone."),
             ("store_failed", "The flash did not take a file: what was in force stays in force."),
+            ("flip_stopped", "The break input has stopped the flip pulses."),
+            (
+                "samples_lost",
+                "Flip cycles went by unread: a pause was longer than the ring of samples is deep.",
+            ),
         )
     )
 )
