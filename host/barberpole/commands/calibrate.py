@@ -13,6 +13,7 @@ from barberpole.calibration_tables import Step
 from barberpole.commands import methods as published
 from barberpole.commands import show
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
+from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut, with_magnitude
 from barberpole.diagnose import compare as compare_fit
 from barberpole.diagnose import diagnose as diagnose_log
 from barberpole.effects import Effect
@@ -45,17 +46,23 @@ def fit(
     selfcal: Annotated[Path | None, typer.Option(help="Board record with the coil run of the same day.")] = None,
     against: Annotated[Path | None, typer.Option(help="An earlier calibration, for offset_coil.")] = None,
     sensor: SensorOption = None,
+    magnitude: MagnitudeOption = None,
+    place: PlaceOption = None,
+    date: DateOption = None,
     as_json: bool = AS_JSON,
 ) -> None:
     """Fit a model to a log and write the calibration."""
     if not (model or method):
         raise InputError(must("fit", "given --model or --method", "neither"))
     data = read_log(log)
-    answer = published.run(data, method, model, sensor, against) if method else None
+    known_ut = magnitude_ut(data, magnitude, place, date)
+    answer = published.run(data, method, model, sensor, against, known_ut) if method else None
     if answer and answer.fit is None:
         published.write_and_show(answer, data, method or "", output, as_json)
         return
-    found, file = (answer.fit, answer.file) if answer and answer.fit and answer.file else _by_model(data, model, sensor)
+    found, file = (
+        (answer.fit, answer.file) if answer and answer.fit and answer.file else _by_model(data, model, sensor, known_ut)
+    )
     calibration = calibration_of(found, data, file, method or "fit")
     run = read_log(selfcal).selfcal if selfcal else data.selfcal
     if run is not None:
@@ -70,8 +77,8 @@ def fit(
         published.show_values(answer)
 
 
-def _by_model(data: Log, model: str, sensor: str | None) -> tuple[Fit, ModelFile]:
-    file = read_model(model)
+def _by_model(data: Log, model: str, sensor: str | None, known_ut: float | None) -> tuple[Fit, ModelFile]:
+    file = with_magnitude(read_model(model), known_ut)
     seen, extra = _seen(data, file, sensor)
     with progress("fit", None) as tick:
         return fit_observations(seen, file, extra, tick), file

@@ -12,6 +12,7 @@ from barberpole.board import load_sensor
 from barberpole.calibration import read_calibration
 from barberpole.calibration_tables import Value
 from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
+from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut
 from barberpole.files import write_atomic
 from barberpole.log import Log, read_log
 from barberpole.methods.answer import Answer, Given, Values
@@ -45,25 +46,31 @@ def methods(as_json: bool = AS_JSON) -> None:
 
 def calibrate_over_temperature(
     logs: Annotated[list[Path], typer.Argument(help="One log a temperature, five or more.")],
-    magnitude: Annotated[float, typer.Option(help="|B| in µT where the logs do not say.")] = 50.0,
+    magnitude: MagnitudeOption = None,
+    place: PlaceOption = None,
+    date: DateOption = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="TOML of the polynomials.")] = None,
     as_json: bool = AS_JSON,
 ) -> None:
     """Quadratic bias and cubic scale factors over temperature (thesis 6.1.3.2)."""
     read = [read_log(path) for path in logs]
-    found = from_logs(read, Given({"magnitude_ut": magnitude}))
+    known_ut = magnitude_ut(read[0], magnitude, place, date)
+    found = from_logs(read, Given({} if known_ut is None else {"magnitude_ut": known_ut}))
     answer = Answer(values_of(found), notes=(f"{len(read)} temperatures",))
     write_and_show(answer, read[0], "calibrate-over-temperature", output, as_json)
 
 
-def run(data: Log, method: str, model: str, sensor: str | None, against: Path | None) -> Answer:
-    """The method on a log, with what the command line and the log's board say beside it."""
+def run(
+    data: Log, method: str, model: str, sensor: str | None, against: Path | None, known_ut: float | None = None
+) -> Answer:
+    """The method on a log, with what the command line and the log's board say beside it; known_ut: |B|."""
     file = read_model(model) if model else None
+    magnitude = {} if known_ut is None else {"magnitude_ut": known_ut}
     name = sensor or (file.sensor if file else None) or data.meta.get("sensor")
     return find_method(method).run(
         data,
         Given(
-            dict(file.reference) if file else {},
+            (dict(file.reference) if file else {}) | magnitude,
             load_sensor(name) if name else None,
             read_calibration(against) if against else None,
         ),

@@ -1,6 +1,7 @@
 """The published scalar methods on a log: their answer as bias, scale and misalignment, judged like any other fit."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,10 @@ from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations
 
 WHAT = "an ellipsoid fit"
+NOT_KNOWN = (
+    f"K is not known: with the {NOMINAL_MAGNITUDE_UT:g} µT assumed, L and the field are right but for a common factor "
+    "(--magnitude, or --place and --date, says it)"
+)
 
 
 def ellipsoid(log: Log, given: Given) -> Answer:
@@ -34,7 +39,7 @@ def ellipsoid(log: Log, given: Given) -> Answer:
     answer, seen, known = _answer(log, given, shape_of)
     first, last = (1000.0 * _misfit_rms(shape, seen, known) for shape in shapes)
     note = f"|H| - K rms: {first:.5g} nT after the algebraic step, {last:.5g} nT after the last"
-    return Answer(answer.values, answer.fit, answer.file, (note,))
+    return replace(answer, notes=(*answer.notes, note))
 
 
 def ellipsoid_algebraic(log: Log, given: Given) -> Answer:
@@ -54,7 +59,7 @@ def iterative_ellipsoid(log: Log, given: Given) -> Answer:
         return found.shape
 
     answer = _answer(log, given, shape_of)[0]
-    return Answer(answer.values, answer.fit, answer.file, (f"settled after {rounds[0]} rounds of eq. 4.21",))
+    return replace(answer, notes=(*answer.notes, f"settled after {rounds[0]} rounds of eq. 4.21"))
 
 
 def _answer(log: Log, given: Given, shape_of: Callable) -> tuple[Answer, Observations, float]:
@@ -65,7 +70,9 @@ def _answer(log: Log, given: Given, shape_of: Callable) -> tuple[Answer, Observa
     require_seen(seen, known, log.path)
     shape = shape_of(seen.y, known)
     fit = judged(Linear(np.linalg.inv(shape.upper), shape.centre, known), seen, known)
-    return Answer(_values(shape, seen, known), fit, file), seen, known
+    is_known = seen.b_mag is not None or "magnitude_ut" in given.reference
+    values = _values(shape, seen, known) | {"K": value(known, 0.0 if is_known else np.nan, "uT")}
+    return Answer(values, fit, file, () if is_known else (NOT_KNOWN,)), seen, known
 
 
 def _values(shape: Ellipsoid, seen: Observations, known: float) -> Values:
@@ -73,11 +80,7 @@ def _values(shape: Ellipsoid, seen: Observations, known: float) -> Values:
     stderr = np.sqrt(np.diag(cramer_rao(seen.y, shape, known, noise_lsb(shape, seen.y, known))))
     upper = np.zeros((3, 3))
     upper[np.triu_indices(3)] = stderr[:6]
-    return (
-        matrix_values("L", shape.upper, upper, "uT/LSB")
-        | per_axis("b", shape.centre, stderr[6:], "LSB")
-        | {"K": value(known, 0.0, "uT")}
-    )
+    return matrix_values("L", shape.upper, upper, "uT/LSB") | per_axis("b", shape.centre, stderr[6:], "LSB")
 
 
 def _misfit_rms(shape: Ellipsoid, seen: Observations, known: float) -> float:
