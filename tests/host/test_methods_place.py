@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from barberpole.challenge.motion import directions
 from barberpole.cli import run as command
 from barberpole.log import Log, write_log
 from barberpole.navigation.geomagnetic import geomagnetic_magnitude_ut
-from truth.motion import directions
 
 PLACE, DAY = "48.7215,2.2092,160", "2012-06-01"  # thesis 6.1.3.2; Plateau de Saclay lies 160 m high
 SITE_UT = geomagnetic_magnitude_ut(48.7215, 2.2092, 0.16, date(2012, 6, 1))
