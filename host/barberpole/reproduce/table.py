@@ -1,14 +1,17 @@
 """All rows as one page of Markdown: a function of the code alone, without date, path or machine."""
 
 from pathlib import Path
-from types import ModuleType
 
 from barberpole.files import write_atomic
-from barberpole.reproduce import article, thesis_apparatus, thesis_calibration, thesis_electronics, thesis_law
+from barberpole.reproduce import (
+    article,
+    repeatability,
+    thesis_apparatus,
+    thesis_calibration,
+    thesis_electronics,
+    thesis_law,
+)
 from barberpole.reproduce.row import Row
-
-MODULES: tuple[ModuleType, ...] = (thesis_law, thesis_electronics, thesis_calibration, thesis_apparatus, article)
-"""In the order of the page."""
 
 INTRODUCTION = """# Published figures, reproduced
 
@@ -18,9 +21,16 @@ route. A ratio outside 0.98 to 1.02 has a remark that says what in the source do
 """
 
 
-def all_rows() -> list[Row]:
-    """The rows of all modules, in the order of MODULES."""
-    return [row for module in MODULES for row in module.rows()]
+def all_rows(power_ups: int = repeatability.POWER_UPS) -> list[Row]:
+    """The rows of all modules, in the order of the sources; power_ups: of the emulated board, for fig. 6.26."""
+    return [
+        *thesis_law.rows(),
+        *thesis_electronics.rows(),
+        *thesis_calibration.rows(),
+        *repeatability.rows(power_ups),
+        *thesis_apparatus.rows(),
+        *article.rows(),
+    ]
 
 
 def markdown(rows: list[Row]) -> str:
@@ -31,9 +41,9 @@ def markdown(rows: list[Row]) -> str:
     return "\n".join(parts)
 
 
-def write_page(path: Path) -> None:
-    """Write the page to `path`."""
-    write_atomic(path, markdown(all_rows()))
+def write_page(path: Path, rows: list[Row] | None = None) -> None:
+    """Write the page to `path`; rows: all of them, unless given."""
+    write_atomic(path, markdown(all_rows() if rows is None else rows))
 
 
 def _summary(rows: list[Row]) -> str:

@@ -9,6 +9,7 @@ from barberpole.methods.cross_axis import ANISOTROPY_UT, Search, flipped, interv
 from barberpole.methods.ellipsoid import efficient
 from barberpole.methods.iterative import iterative
 from barberpole.methods.offset_coil import Affine, transfer, transferred
+from barberpole.reproduce.repeatability import BIAS_PPM, SCALE_PPM
 from barberpole.reproduce.row import Row
 from barberpole.trajectory.shapes import GOLDEN_ANGLE, direction
 
@@ -43,7 +44,6 @@ PRINTED_SC = {(0, 0): 0.9947, (0, 1): 0.0017, (0, 2): 0.0524, (1, 1): 0.9948, (1
 PRINTED_BC = (-0.00529, 0.00563, 0.00028)  # 6.8, gauss
 REPEATS_A22 = (1.0, 1.00001, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.99998, 0.99999)  # fig. 6.26
 REPEATS_B31 = (0.02732, 0.02732, 0.02732, 0.02732, 0.02732, 0.02733, 0.02733, 0.02734, 0.02733, 0.02733)
-SCALE_PPM, BIAS_PPM = 30.0, 5.0  # 6.2.2.2
 
 
 def rows() -> list[Row]:
