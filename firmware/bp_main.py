@@ -110,7 +110,7 @@ def stream(hardware, writer, clock, said):  # a row a cycle until Ctrl-C, or unt
             report.event(writer, clock.now_s(), reasons.SATURATED)
         clipped = sampler.clipped
         if sampler.lost != lost:
-            report.event(writer, clock.now_s(), reasons.SAMPLES_LOST, "%d flip cycles" % (sampler.lost - lost))
+            report.event(writer, clock.now_s(), reasons.SAMPLES_LOST, f"{sampler.lost - lost} flip cycles")
             lost = sampler.lost
         writer.frame(records.ROW, report.row(sampler, hardware.compensator, clock.at_us(sampler.mid_us)))
         rows += 1
