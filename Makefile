@@ -40,7 +40,7 @@ clean:
 $(STAMP): pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "installing barberpole and its tools into $(VENV) (once)"
-	@$(PIP) --editable '.[twin,test]'
+	@$(PIP) --editable '.[twin,fleet,test]'
 	@touch $@
 
 # The stubs of MicroPython's modules shadow the standard library, so they live apart from the packages of .venv.

@@ -10,7 +10,18 @@ import typer
 
 import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, so it comes first)
 from barberpole import __version__
-from barberpole.commands import board, calibrate, catalogue, challenge, characterise, demo, design, methods, trajectory
+from barberpole.commands import (
+    board,
+    calibrate,
+    catalogue,
+    challenge,
+    characterise,
+    demo,
+    design,
+    fleet,
+    methods,
+    trajectory,
+)
 from barberpole.errors import BarberpoleError, must
 
 interrupt.loaded()
@@ -33,6 +44,7 @@ trajectory.register(app)
 design.register(app)
 challenge.register(app)
 demo.register(app)
+fleet.register(app)
 
 
 @app.callback(invoke_without_command=True)
