@@ -10,37 +10,29 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from barberpole.board import Board
 
-from barberpole_codegen.trace import SQRT, Program
-
-REFERENCE_MHZ = 168.0
-
-
-@dataclass(frozen=True)
-class Cost:
-    """µs of one operation of bytecode at 168 MHz, and where the figure comes from."""
-
-    us: float
-    source: str
-
-
-# Timed on the stm32 port for the F405, run in an emulator that counts cycles: about 20 % either way.
-FLOAT_OPERATION = Cost(9.4, "340 us for demodulation, 3 x 3 matrix and cross field: 36 float operations")
-GIVENS_INNER = Cost(
-    55.0, "4.1 ms for a row of 10 unknowns and 3 right-hand sides: 75 inner steps, square roots included"
+from barberpole_codegen.costs import (
+    CALL,
+    FLOAT_OPERATION,
+    GIVENS_INNER,
+    PACK,
+    REFERENCE_MHZ,
+    ROOT,
+    SAMPLE_WORD,
+    VIPER_OPERATION,
+    at_clock,
+    program_us,
 )
-SAMPLE_WORD = Cost(4.6, "220 us for the sum of 16 x 3 samples; a three-byte word is counted as two")
-FRAME_BYTE = Cost(8.0, "estimated: 12 bytecodes a byte for the check sum, as in the sum of samples")
-ROOT = Cost(12.0, "estimated: a float operation and a call")
+from barberpole_codegen.hot import Hot
+from barberpole_codegen.rows import RowPath, row_us, sampling_us
+from barberpole_codegen.trace import Program
 
 UNKNOWNS, SIDES = 4, 3
 LOOKS = 3  # at the first block of points before the whole run, as in firmware/bp_selfcal.py
-ROW_BYTES = 69  # of a streamed frame before base64
 
 
 def flash_bytes(files: dict[str, bytes]) -> dict[str, int]:
@@ -49,23 +41,13 @@ def flash_bytes(files: dict[str, bytes]) -> dict[str, int]:
     return {**sizes, "total": sum(sizes.values())}
 
 
-def program_us(program: Program, board: Board) -> float:
-    """Estimated time of one call."""
-    count = program.count()
-    roots = count.get(SQRT, 0)
-    return _at(board, (sum(count.values()) - roots) * FLOAT_OPERATION.us + roots * ROOT.us)
-
-
-def times_us(programs: dict[str, Program], board: Board) -> dict[str, Any]:
+def times_us(programs: dict[str, Program], board: Board, hot: Hot | None, path: RowPath) -> dict[str, Any]:
     """Estimated µs of a streamed row and of a self-calibration point, with their parts."""
     inner = UNKNOWNS * (UNKNOWNS - 1) // 2 + UNKNOWNS * SIDES
-    words = 2 * 3 * board.adc.samples_per_half
+    rows = row_us(programs, hot, board)
     parts = {
-        "sums_of_a_cycle": _at(board, 2 * words * SAMPLE_WORD.us),
-        "undo": program_us(programs["undo"], board),
         "undo_coil": program_us(programs["undo_coil"], board),
-        "givens_row": _at(board, inner * GIVENS_INNER.us),
-        "frame": _at(board, ROW_BYTES * FRAME_BYTE.us),
+        "givens_row": at_clock(board, inner * GIVENS_INNER.us),
     }
     cycle_us = 1e6 / board.flip.rate_hz
     point_us = parts["undo_coil"] + parts["givens_row"]
@@ -73,9 +55,13 @@ def times_us(programs: dict[str, Program], board: Board) -> dict[str, Any]:
     cycles = run.settle_cycles + run.cycles_per_point
     read = run.points + LOOKS * 6 * len(run.radii_ut)
     return {
-        "parts": {name: round(value) for name, value in parts.items()},
+        "path": path.name,
+        "path_why": path.why,
+        "parts": {name: round(value) for name, value in (rows[path.name] | parts).items()},
+        "row_by_path": {name: round(sum(found.values())) for name, found in rows.items()},
         "flip_cycle": round(cycle_us),
-        "sample": round(parts["sums_of_a_cycle"] + parts["undo"] + parts["frame"]),
+        "sampling": round(sampling_us(board)),
+        "sample": round(sum(rows[path.name].values())),
         "selfcal_point": round(point_us),
         "selfcal_run": round(run.points * cycles * cycle_us + read * point_us),
         "meaning": _MEANING,
@@ -120,7 +106,8 @@ print(json.dumps(used))
 
 
 _MEANING = {
-    "sample": "arithmetic of one streamed row; what does not fit beside sampling stretches the flip cycle",
+    "sample": "counted operations of one streamed row times the cost of each, not timed; what does not fit beside "
+    "sampling stretches the flip cycle",
     "selfcal_point": "arithmetic of one point, done after the coils are off",
     "selfcal_run": "flip cycles of all points, three looks at the first block, arithmetic of all points",
 }
@@ -132,11 +119,9 @@ def _sources(board: Board) -> dict[str, str]:
         "square root": ROOT,
         "inner step of a Givens row": GIVENS_INNER,
         "sample": SAMPLE_WORD,
-        "byte of a frame": FRAME_BYTE,
+        "operation in viper": VIPER_OPERATION,
+        "call of native code": CALL,
+        "figure of a row in bytecode": PACK,
     }
     said = {name: f"{cost.us:g} us: {cost.source}" for name, cost in costs.items()}
     return {**said, "clock": f"figures at {REFERENCE_MHZ:g} MHz, scaled to {board.cpu_mhz:g} MHz"}
-
-
-def _at(board: Board, us: float) -> float:
-    return us * REFERENCE_MHZ / board.cpu_mhz

@@ -25,9 +25,9 @@ from barberpole.errors import InputError, LimitError, must
 from barberpole_codegen import budget, image
 from barberpole_codegen.modules import VERSION, Generated, generate
 from barberpole_codegen.narrow import Precision
+from barberpole_codegen.rows import AUTO
 
 FORMAT = 1
-GENERATED = ("bp_board", "bp_trajectory", "bp_calibration")
 
 Progress = Callable[[str], None]
 
@@ -51,9 +51,11 @@ def build(
     calibration: str | Path | Calibration,
     out_dir: str | Path,
     progress: Progress | None = None,
+    path: str = AUTO,
 ) -> BuildResult:
     """Build for a board (name, path or object) with a calibration (path or object) into `out_dir`.
 
+    `path`: how a streamed row is made, "bytecode", "viper" or "auto" (by flip rate).
     `out_dir` is new, empty, or a former build, which is replaced. Raises InputError or LimitError; then nothing
     changed.
     """
@@ -63,18 +65,19 @@ def build(
     out_dir = Path(out_dir)
     _require_replaceable(out_dir)
     say("tracing the compensation and checking it in float32")
-    made = generate(board, calibration)
+    made = generate(board, calibration, path)
     sources = {**image.firmware_sources(paths.firmware()), **made.texts}
-    say(f"compiling {len(sources) - 1} modules")
+    say(f"compiling {len(sources) - len(image.TEXTS)} modules")
     compiled = {
         name.replace(".py", ".mpy"): image.compile_module(name, text)
         for name, text in sorted(sources.items())
-        if name != image.MAIN
+        if name not in image.TEXTS
     }
     say("packing the image and measuring its cost")
-    rom = image.romfs_image(compiled)
+    rom = image.romfs_image({**compiled, image.NATIVE: sources[image.NATIVE].encode()})
     costs = _costs(board, made, sources, compiled, rom)
-    files = {f"mpy/{name}": f"lib/{name}" for name in compiled} | {f"src/{image.MAIN}": image.MAIN}
+    files = {f"mpy/{name}": f"lib/{name}" for name in compiled}
+    files |= {f"src/{image.NATIVE}": f"lib/{image.NATIVE}", f"src/{image.MAIN}": image.MAIN}
     result = BuildResult(
         out_dir, board.name, calibration.model.hash, calibration.hash, made.table.id, files, made.precision, costs
     )
@@ -96,20 +99,29 @@ def _costs(
     board: Board, made: Generated, sources: dict[str, str], compiled: dict[str, bytes], rom: bytes
 ) -> dict[str, Any]:
     """budget.json. Raises LimitError where the files exceed the board's file system."""
-    flash = budget.flash_bytes({**compiled, image.MAIN: sources[image.MAIN].encode()})
+    flash = budget.flash_bytes({**compiled, **{name: sources[name].encode() for name in image.TEXTS}})
     if flash["total"] > board.filesystem_kib * 1024:
         limit = f"at most {board.filesystem_kib} KiB (filesystem_kib)"
         raise LimitError(must("the build", limit, f"{flash['total'] / 1024:.0f} KiB", board.name))
     return {
         "flash_bytes": flash,
         "romfs_bytes": len(rom),
-        "ram_on_import_bytes": budget.ram_on_import(rom, list(GENERATED)),
+        "ram_on_import_bytes": budget.ram_on_import(rom, [name[:-3] for name in made.texts]),
         "ram_source": "gc.mem_free around each import from ROMFS, 64-bit unix interpreter; a board needs about half",
         "points_bytes": 54 * made.table.points,
-        "time_us": budget.times_us(made.programs, board),
+        "time_us": budget.times_us(made.programs, board, made.hot, made.path),
+        "fixed_point": _fixed_point(made),
         "float_operations": {name: sum(p.count().values()) for name, p in made.programs.items()},
         "float32_error_of_full_scale": {name: p.fraction for name, p in made.precision.items()},
     }
+
+
+def _fixed_point(made: Generated) -> dict[str, Any] | None:
+    """What is proven of the row in fixed point, None where no useful range can be."""
+    if made.hot is None:
+        return None
+    hot = made.hot
+    return {"range_ut": hot.range_ut, "error_nt": 1e3 * hot.error_ut, "instructions": hot.count()}
 
 
 def _content(

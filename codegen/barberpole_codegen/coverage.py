@@ -55,7 +55,7 @@ def compensation(program: Program, fitted: Fitted, board: Board, temps_c: tuple[
 
     def attempt(range_ut: float) -> Precision:
         tried = conditions(range_ut, board, temps_c, 0.0)
-        return precision(program, _readings(fitted, fitted.model, tried), tried.field_ut, range_ut)
+        return precision(program, readings(fitted, fitted.model, tried), tried.field_ut, range_ut)
 
     return _widest(attempt, board, "the compensation")
 
@@ -67,10 +67,10 @@ def coil_run(program: Program, fitted: Fitted, board: Board, temps_c: tuple[floa
 
     def attempt(range_ut: float) -> Precision:
         tried = conditions(range_ut, board, temps_c, largest)
-        readings = _readings(fitted, inner, tried)
-        readings |= dict(zip(("cx", "cy", "cz"), tried.coil_ut, strict=True))
+        given = readings(fitted, inner, tried)
+        given |= dict(zip(("cx", "cy", "cz"), tried.coil_ut, strict=True))
         own = tried.field_ut + tried.coil_ut
-        return precision(program, readings, np.concatenate([own, own]), range_ut)
+        return precision(program, given, np.concatenate([own, own]), range_ut)
 
     return _widest(attempt, board, "the field of the dies")
 
@@ -87,7 +87,7 @@ def _widest(attempt, board: Board, what: str) -> Precision:
     raise LimitError(must("the calibration", f"a model that can be undone {reason}", "one that cannot"))
 
 
-def _readings(fitted: Fitted, model, tried: Tried) -> dict[str, np.ndarray]:
+def readings(fitted: Fitted, model, tried: Tried) -> dict[str, np.ndarray]:
     """Inputs of the generated functions: SET and RESET readings with the sign of SET, temperature, gains."""
     given: dict[str, np.ndarray] = {"t": tried.temp_c}
     given |= dict(zip(("gx", "gy", "gz"), tried.gain, strict=True))

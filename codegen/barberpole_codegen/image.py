@@ -14,6 +14,8 @@ from mpremote.romfs import VfsRomWriter
 
 ARCHITECTURE = "armv7emsp"
 MAIN = "main.py"  # stays text: a board looks for it by that name
+NATIVE = "bp_fixed.py"  # stays text too: a board compiles it for its own processor
+TEXTS = (MAIN, NATIVE)
 
 
 def firmware_sources(folder: Path) -> dict[str, str]:
@@ -39,7 +41,7 @@ def compile_module(name: str, text: str) -> bytes:
 
 
 def romfs_image(modules: dict[str, bytes]) -> bytes:
-    """A ROMFS image with the modules in /lib, in the order of their names."""
+    """A ROMFS image with the modules (.mpy or text) in /lib, in the order of their names."""
     writer = VfsRomWriter()
     writer.opendir("lib")
     for name in sorted(modules):

@@ -10,7 +10,9 @@ from barberpole.trajectory import CodeTable, code_table, for_board
 from barberpole_codegen import coverage, settings
 from barberpole_codegen.emit import Function, module, number
 from barberpole_codegen.functions import trace_in_frame, trace_undo, trace_undo_coil
+from barberpole_codegen.hot import Hot, hot_row, hot_text
 from barberpole_codegen.narrow import Precision, narrow
+from barberpole_codegen.rows import AUTO, VIPER, RowPath, choose_path
 from barberpole_codegen.trace import Program
 
 VERSION = "0.1"
@@ -19,16 +21,21 @@ BEYOND_LOG_C = 10.0  # temperatures this far outside the log are tried too
 
 @dataclass(frozen=True)
 class Generated:
-    """Text by file name, the traced programs, and what narrowing costs."""
+    """Text by file name, the traced programs, what narrowing costs, and the row in fixed point where one is used."""
 
     texts: dict[str, str]
     programs: dict[str, Program]
     precision: dict[str, Precision]
     table: CodeTable
+    path: RowPath
+    hot: Hot | None
 
 
-def generate(board: Board, calibration: Calibration) -> Generated:
-    """All generated text. Raises a BarberpoleError where board and calibration do not go together."""
+def generate(board: Board, calibration: Calibration, path: str = AUTO) -> Generated:
+    """All generated text. `path`: "bytecode" or "viper" for the streamed row, "auto" to choose by flip rate.
+
+    Raises a BarberpoleError where board and calibration do not go together.
+    """
     table = code_table(for_board(board), board)
     fitted = from_calibration(calibration)
     traced = {
@@ -42,12 +49,16 @@ def generate(board: Board, calibration: Calibration) -> Generated:
         "undo": coverage.compensation(traced["undo"], fitted, board, temps_c),
         "undo_coil": coverage.coil_run(traced["undo_coil"], fitted, board, temps_c),
     }
+    hot = hot_row(fitted, board, temps_c)
+    chosen = choose_path(path, programs, hot, board)
     texts = {
         "bp_board.py": board_text(board),
         "bp_trajectory.py": trajectory_text(board, table),
-        "bp_calibration.py": calibration_text(calibration, board, table, programs, precision),
+        "bp_calibration.py": calibration_text(calibration, board, table, programs, precision, chosen.name),
     }
-    return Generated(texts, programs, precision, table)
+    if hot is not None and chosen.name == VIPER:
+        texts["bp_hot.py"] = hot_text(hot, calibration.hash, VERSION)
+    return Generated(texts, programs, precision, table, chosen, hot)
 
 
 def board_text(board: Board) -> str:
@@ -67,6 +78,7 @@ def calibration_text(
     table: CodeTable,
     programs: dict[str, Program],
     precision: dict[str, Precision],
+    path: str,
 ) -> str:
     readings = "SET and RESET readings (LSB, both with the sign of SET), temperature (degC), gains over the factory's."
     comments = {
@@ -82,7 +94,7 @@ def calibration_text(
         f"calibration {calibration.hash}",
         VERSION,
         [_inverse_note(calibration), *_precision_notes(precision), *_parameter_notes(calibration)],
-        settings.calibration_constants(calibration, board, table),
+        settings.calibration_constants(calibration, board, table, path),
         [Function(name, program, comments[name]) for name, program in programs.items()],
     )
 

@@ -12,6 +12,7 @@ from barberpole.selfcal import slope_lsb_per_ut
 from barberpole.trajectory import CodeTable
 
 from barberpole_codegen.emit import Constant, literal
+from barberpole_codegen.functions import RowScales
 from barberpole_codegen.narrow import narrow_number
 
 SUPPLY_FRACTION = 0.95  # below this the pulse is weaker than the board was designed for
@@ -26,6 +27,7 @@ LAST_RATIO_CODE = 6  # the next is 16256, not a power of two
 LARGEST_GAIN = 128
 FRAME_BITS = 240  # status, eight channels and check sum of 24 bits
 MOST_SUMMED = 255
+CONVERSIONS = 2  # of a channel other than the bridges' in a cycle: one after SET, one after RESET
 T0_C = 25.0  # at which the sensor file gives the bridge resistance
 
 
@@ -47,7 +49,7 @@ def trajectory_constants(table: CodeTable) -> list[Constant]:
     ]
 
 
-def calibration_constants(calibration: Calibration, board: Board, table: CodeTable) -> list[Constant]:
+def calibration_constants(calibration: Calibration, board: Board, table: CodeTable, path: str) -> list[Constant]:
     """What was fitted, and by what a run is judged."""
     factory = factory_response(calibration, board, table)
     drift = board.selfcal.gain_drift_limit if calibration.selfcal else WIDE_DRIFT
@@ -56,6 +58,7 @@ def calibration_constants(calibration: Calibration, board: Board, table: CodeTab
         Constant("CALIBRATION", calibration.hash),
         Constant("BOARD", digest(board_constants(board)[:-1]), "bp_board.HASH that this belongs to"),
         Constant("TRAJECTORY", table.id, "bp_trajectory.ID that this belongs to"),
+        Constant("PATH", path, "of a streamed row: bytecode, or viper by bp_hot"),
         Constant("EFFECTS", tuple(calibration.model.effects)),
         Constant("HAS_FACTORY_REFERENCE", bool(calibration.selfcal)),
         Constant("FACTORY_GAIN_UT_PER_UNIT", tuple(narrowed(row) for row in factory), "row: axis, column: coil"),
@@ -142,22 +145,19 @@ def _flip(board: Board) -> list[Constant]:
 
 
 def _adc(board: Board) -> list[Constant]:
-    adc, sensor = board.adc, board.sensor
-    lsb_per_v = float(1 << (adc.bits - 1)) / adc.vref_v
-    bridge_v = sensor.bridge_v * adc.bridge_divider
-    c_per_v = 1.0 / (sensor.bridge_tempco_per_c * bridge_v)
+    adc, scales = board.adc, row_scales(board)
     c = adc.channels
     channels = (c.x, c.y, c.z, c.bridge, c.coil_x, c.coil_y, c.coil_z, c.supply)
     gain1, gain2 = _gain_registers(adc.pga, channels[:3])
     ratio = _ratio_code(adc.sample_hz)
     _require_frame_time(adc.baud, adc.sample_hz)
     per_lsb = {
-        "TEMP_AT_0_C": (T0_C - c_per_v * bridge_v, "bridge temperature for a code of 0"),
-        "TEMP_C_PER_LSB": (c_per_v / lsb_per_v, "the bridge's resistance at a constant current is the thermometer"),
-        "COIL_MA_PER_LSB": (1000.0 / (adc.coil_shunt_ohm * lsb_per_v), ""),
-        "SUPPLY_V_PER_LSB": (1.0 / (adc.supply_divider * lsb_per_v), ""),
+        "TEMP_AT_0_C": (scales.zero_c, "bridge temperature for a code of 0"),
+        "TEMP_C_PER_LSB": (scales.c_per_lsb, "the bridge's resistance at a constant current is the thermometer"),
+        "COIL_MA_PER_LSB": (scales.ma_per_lsb, ""),
+        "SUPPLY_V_PER_LSB": (scales.v_per_lsb, ""),
         "SUPPLY_MIN_V": (SUPPLY_FRACTION * board.flip.strap_supply_v, "of the flip pulses"),
-        "LSB_PER_V": (lsb_per_v * adc.pga, "at the bridge"),
+        "LSB_PER_V": (_lsb_per_v(board) * adc.pga, "at the bridge"),
     }
     return [
         Constant("ADC_SPI", adc.spi),
@@ -172,6 +172,25 @@ def _adc(board: Board) -> list[Constant]:
         Constant("SAMPLES_PER_HALF", adc.samples_per_half),
         *(Constant(name, narrowed((value,))[0], comment) for name, (value, comment) in per_lsb.items()),
     ]
+
+
+def row_scales(board: Board) -> RowScales:
+    """From the sums of a cycle to temperature, currents and supply; the bridge's resistance is the thermometer."""
+    lsb_per_v = _lsb_per_v(board)
+    bridge_v = board.sensor.bridge_v * board.adc.bridge_divider
+    c_per_v = 1.0 / (board.sensor.bridge_tempco_per_c * bridge_v)
+    return RowScales(
+        zero_c=T0_C - c_per_v * bridge_v,
+        c_per_lsb=c_per_v / lsb_per_v,
+        ma_per_lsb=1000.0 / (board.adc.coil_shunt_ohm * lsb_per_v),
+        v_per_lsb=1.0 / (board.adc.supply_divider * lsb_per_v),
+        samples=board.adc.samples_per_half,
+        conversions=CONVERSIONS,
+    )
+
+
+def _lsb_per_v(board: Board) -> float:
+    return float(1 << (board.adc.bits - 1)) / board.adc.vref_v
 
 
 def _gain_registers(pga: int, bridges: tuple[int, ...]) -> tuple[int, int]:

@@ -94,7 +94,12 @@ def micropython():
 
     def run(script: str, cwd: Path) -> str:
         done = subprocess.run(
-            [interpreter, "-c", script], capture_output=True, text=True, timeout=60, check=False, cwd=cwd
+            [interpreter, "-c", script],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+            cwd=cwd,
         )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout

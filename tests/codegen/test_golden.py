@@ -11,7 +11,7 @@ from barberpole_codegen.trace import trace
 GOLDEN = Path(__file__).parent / "golden"
 
 
-@pytest.mark.parametrize("name", ["bp_board.py", "bp_trajectory.py", "bp_calibration.py"])
+@pytest.mark.parametrize("name", ["bp_board.py", "bp_trajectory.py", "bp_calibration.py", "bp_hot.py"])
 def test_text_is_the_accepted_one(name, generated, update):
     text, path = generated.texts[name], GOLDEN / name
     if update:

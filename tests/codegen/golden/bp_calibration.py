@@ -39,6 +39,7 @@ MODEL = "afb2e175a12a"  # the effects and their settings
 CALIBRATION = "49de9c7a3545"
 BOARD = "26508d555443"  # bp_board.HASH that this belongs to
 TRAJECTORY = "2a88b776adb7"  # bp_trajectory.ID that this belongs to
+PATH = "viper"  # of a streamed row: bytecode, or viper by bp_hot
 EFFECTS = (
     "misalignment",
     "cross_field",

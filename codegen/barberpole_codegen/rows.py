@@ -1,0 +1,78 @@
+"""What a streamed row costs, by each path, and which path is taken: bytecode where it fits, viper above.
+
+A flip cycle is settling, sampling and a row; what does not fit stretches the cycle. Operations of native code are
+counted in the source of firmware/bp_fixed.py.
+"""
+
+from dataclasses import dataclass
+
+from barberpole.board import Board
+from barberpole.errors import InputError, LimitError, must
+
+from barberpole_codegen.costs import CALL, PACK, SAMPLE_WORD, VIPER_OPERATION, at_clock, program_us
+from barberpole_codegen.hot import Hot
+from barberpole_codegen.trace import Program
+
+ROW_BYTES = 69  # of a streamed frame before base64
+SUMS, FIGURES = 11, 8  # of a row: what goes in, and what comes out as floats
+
+
+# Operations in firmware/bp_fixed.py, counted in its source: of an instruction, and of one turn of each loop.
+PRODUCT, SUM, TAKE, FLOAT, NORMALISE, COPY, CRC, BASE64, SUM24 = 47, 42, 37, 43, 5, 7, 17, 35, 22
+FAST_CALLS = 14  # of native code, in bp_fast.FastRow.frame
+SHORTEST = 29  # turns that bring the smallest number to the left: a coil at rest has one
+
+AUTO, BYTECODE, VIPER = "auto", "bytecode", "viper"
+
+
+@dataclass(frozen=True)
+class RowPath:
+    """How a streamed row is made, and why."""
+
+    name: str
+    why: str
+
+
+def row_us(programs: dict[str, Program], hot: Hot | None, board: Board) -> dict[str, dict[str, float]]:
+    """Estimated µs of the parts of a streamed row, by path. The check sum of a frame is native on both."""
+    words = 2 * 3 * board.adc.samples_per_half
+    sums = {"sums_of_a_cycle": at_clock(board, 2 * words * SAMPLE_WORD.us)}
+    frame = native_us(board, ROW_BYTES * CRC)
+    slow = {"undo": program_us(programs["undo"], board), "pack": at_clock(board, 2 * SUMS * PACK.us)}
+    paths = {BYTECODE: {**sums, **slow, "frame": frame + at_clock(board, 4 * CALL.us)}}
+    if hot is not None:
+        count = hot.count()
+        arithmetic = SUMS * TAKE + count["products"] * PRODUCT + count["sums"] * SUM
+        figures = FIGURES * (FLOAT + SHORTEST * NORMALISE + 4 * COPY)
+        frame += native_us(board, ROW_BYTES // 3 * BASE64) + at_clock(board, FAST_CALLS * CALL.us)
+        fast = {"undo": native_us(board, arithmetic), "pack": native_us(board, figures)}
+        paths[VIPER] = {**sums, **fast, "frame": frame}
+    return paths
+
+
+def native_us(board: Board, operations: int) -> float:
+    """Estimated time of counted operations in viper."""
+    return at_clock(board, operations * VIPER_OPERATION.us)
+
+
+def sampling_us(board: Board) -> float:
+    """What a flip cycle needs for its pulses, settling and samples."""
+    return 2.0 * (board.flip.pulse_us + board.flip.settle_us + 1e6 * board.adc.samples_per_half / board.adc.sample_hz)
+
+
+def choose_path(asked: str, programs: dict[str, Program], hot: Hot | None, board: Board) -> RowPath:
+    """Bytecode where a row fits beside the sampling of a flip cycle, viper above. Raises InputError or LimitError."""
+    if asked not in (AUTO, BYTECODE, VIPER):
+        raise InputError(must("the path of a row", f"one of {AUTO}, {BYTECODE}, {VIPER}", repr(asked)))
+    if asked == VIPER and hot is None:
+        raise LimitError(must("the calibration", "one whose inverse fits into fixed point", "a range that does not"))
+    needs = {name: sum(parts.values()) for name, parts in row_us(programs, hot, board).items()}
+    left = 1e6 / board.flip.rate_hz - sampling_us(board)
+    says = f"at {board.flip.rate_hz:g} Hz sampling leaves {left:.0f} us of a cycle; " + ", ".join(
+        f"a row needs {us:.0f} us in {name}" for name, us in needs.items()
+    )
+    if asked != AUTO:
+        return RowPath(asked, f"asked for; {says}")
+    if hot is None:
+        return RowPath(BYTECODE, f"the calibration's range does not fit into fixed point; {says}")
+    return RowPath(BYTECODE if needs[BYTECODE] <= left else VIPER, says)
