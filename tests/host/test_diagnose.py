@@ -171,7 +171,9 @@ def test_the_recording_that_parts_a_pair_is_computed():
     columns["temp_c"] = 20.0 + 0.1 * columns["t_s"]
     said = diagnose(log_of(columns), model_of(BASE))
     assert {said.suspects[0].effect, *said.suspects[0].confounded_with} == {"drift", "bias_temperature"}
-    assert "an hour later at the same temperature" in said.next_experiment
+    # the two are one column here: which is named first, and so which recording is named, hangs on rounding
+    assert any(way in said.next_experiment for way in ("an hour later at the same temperature", "warm the sensor"))
+    assert "part them by" in said.next_experiment
 
 
 def test_a_bent_bridge_and_a_bent_converter_part_where_raw_readings_are_flipped():

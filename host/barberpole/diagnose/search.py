@@ -21,6 +21,7 @@ REFITTED = 3  # candidates refitted exactly each round
 IN_REACH = 0.5  # of the best linear gain: below it a refit cannot win
 ALIKE = 0.8  # correlation of what an effect explains with what another can: above, they are confusable
 NEARLY = 0.9  # of the best gain: a rival whose held-out error is not clearly worse is not excluded
+WORSE = 1.03  # held-out error over the one before, more than coloured noise alone makes of a true effect
 MOST = 5  # effects added before giving up
 
 
@@ -100,6 +101,8 @@ def attempt(evidence: Evidence, at: int, extra: Sequence[Effect]) -> Trial | Non
     folds = heldout(table, baseline)
     if folds.sum() >= heldout(evidence.table, evidence.baseline).sum():
         return None  # what it takes off does not carry over to stretches it has not seen
+    if after.heldout_rms_lsb > WORSE * evidence.fit.heldout_rms_lsb:
+        return None  # nor is it a cause if those stretches fit worse than they did, whatever the noise model says
     gain = bic_gain(evidence.projection.rss, fall, rank, evidence.table.count, evidence.candidates[at].tried)
     return Trial(evidence.candidates[at], after, gain, fall, folds)
 
