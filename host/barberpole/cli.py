@@ -21,6 +21,7 @@ from barberpole.commands import (
     fleet,
     methods,
     trajectory,
+    workbench,
 )
 from barberpole.errors import BarberpoleError, must
 
@@ -45,6 +46,7 @@ design.register(app)
 challenge.register(app)
 demo.register(app)
 fleet.register(app)
+workbench.register(app)
 
 
 @app.callback(invoke_without_command=True)

@@ -61,7 +61,7 @@ def compare(fit: Fit, noise: Noise | None = None, extra: Sequence[Effect] = ()) 
         patterns=tuple(patterns(evidence)),
         curves=tuple(curves(evidence)),
         spectrum=_spectrum(ground),
-        sphere=_sphere(ground),
+        sphere=map_of_sphere(ground.field, ground.residual, ground.axes),
     )
 
 
@@ -76,15 +76,15 @@ def _spectrum(ground: Ground) -> dict[str, list[float]]:
     return {"f_per_sample": f.tolist()} | {a: p.tolist() for a, p in zip(ground.axes, banded, strict=True)}
 
 
-def _sphere(ground: Ground) -> dict[str, list[list[float | None]]]:
-    """Mean residual by direction of the field."""
-    x, y, z = ground.field / np.maximum(np.linalg.norm(ground.field, axis=0), 1e-300)
+def map_of_sphere(field: np.ndarray, residual: np.ndarray, axes: Sequence[str]) -> dict[str, list[list[float | None]]]:
+    """Mean residual (m, n) of each axis by direction of the field (3, n)."""
+    x, y, z = field / np.maximum(np.linalg.norm(field, axis=0), 1e-300)
     rows = np.minimum(((z + 1) / 2 * MAP[0]).astype(int), MAP[0] - 1)
     columns = np.minimum(((np.arctan2(y, x) / np.pi + 1) / 2 * MAP[1]).astype(int), MAP[1] - 1)
     cell, cells = rows * MAP[1] + columns, MAP[0] * MAP[1]
     count = np.bincount(cell, minlength=cells)
     maps = {}
-    for axis, r in zip(ground.axes, ground.residual, strict=True):
+    for axis, r in zip(axes, residual, strict=True):
         mean = np.bincount(cell, r, cells) / np.maximum(count, 1)
         filled = [float(m) if c else None for m, c in zip(mean, count, strict=True)]
         maps[axis] = [filled[at : at + MAP[1]] for at in range(0, cells, MAP[1])]

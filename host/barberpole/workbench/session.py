@@ -1,0 +1,214 @@
+"""One browser window: what is on its bench, how it came there, and the two workers that compute for it.
+
+No widget is touched here. `on_change` is called with the part that has changed: "log", "fit", "suspects", "busy",
+"history" or "message". `hands` fits and draws, which must be quick; `mind` judges, which may take its time.
+"""
+
+import asyncio
+import tempfile
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from barberpole.errors import BarberpoleError, InputError, must
+from barberpole.modelfile import ModelFile
+from barberpole.workbench.bench import START, Bench
+from barberpole.workbench.history import History
+from barberpole.workbench.lab import Opened, Summary, without_effect
+from barberpole.workbench.pictures import Box, Chosen, Picture, View
+from barberpole.workbench.suspects import Suspect, Suspicion
+from barberpole.workbench.worker import Stopped, Worker
+
+PATIENCE_S = 1.0  # an overtaken diagnosis that has run longer than this is stopped; a shorter one soon ends by itself
+
+Change = Callable[[str], None]
+
+
+@dataclass
+class Session:
+    """folder: files are read and written below it, and nowhere else; uploads and trials go to a place of its own."""
+
+    folder: Path
+    on_change: Change = lambda part: None
+    hands: Worker = field(default_factory=Worker)
+    mind: Worker = field(default_factory=Worker)
+    history: History | None = None
+    opened: Opened | None = None
+    summary: Summary | None = None
+    suspicion: Suspicion | None = None
+    abscissae: dict[str, str] = field(default_factory=dict)
+    busy: str = ""
+    thinking: bool = False
+    message: str = ""
+    progress: int = 0
+    own: tempfile.TemporaryDirectory = field(
+        default_factory=lambda: tempfile.TemporaryDirectory(prefix="barberpole-workbench-")
+    )
+
+    def __post_init__(self) -> None:
+        self._judged: dict[str, Suspicion] = {}
+        self._thought: asyncio.Task | None = None
+        self._since = 0.0
+        self.hands.start()
+
+    @property
+    def bench(self) -> Bench:
+        """What is on the bench. Raises InputError where no log is."""
+        return self.path.now.bench
+
+    @property
+    def path(self) -> History:
+        """The path so far. Raises InputError where no log is open."""
+        if self.history is None:
+            raise InputError(must("a log", "open", "none"))
+        return self.history
+
+    @property
+    def noise_lsb(self) -> float | None:
+        """The noise floor: the least that any diagnosis of this log has found."""
+        of_this = [found.noise_lsb for found in self._judged.values() if found.noise_lsb == found.noise_lsb]
+        return min(of_this, default=None)
+
+    def close(self) -> None:
+        """The window is gone."""
+        if self._thought:
+            self._thought.cancel()
+        self.hands.close()
+        self.mind.close()
+        self.own.cleanup()
+
+    async def open(self, path: Path, file: ModelFile | None = None, rest: Path | None = None) -> bool:
+        """Put a log on the bench, with the model every sensor begins with. False where it cannot be read."""
+        bench = Bench(path, file or ModelFile(START), rest=rest)
+        opened = await self._try("reading the log", self.hands.ask("open_log", bench))
+        if opened is None:
+            return False
+        self.history, self.opened, self.suspicion = History.begin(bench), opened, None
+        self.summary, self._judged = None, {}
+        self.on_change("log")
+        await self.refresh()
+        return True
+
+    async def refresh(self) -> None:
+        """Fit what is on the bench, say so, and judge it in the background."""
+        bench = self.bench
+        self.suspicion = self._judged.get(bench.key)
+        self.on_change("history")
+        summary = await self._try("fitting", self.hands.ask("summary", bench, tick=self._tick))
+        if bench != self.bench:
+            return  # something newer is on the bench by now
+        self.summary = summary
+        if summary is None:
+            self.on_change("fit")
+            return
+        self.history = self.path.measured(summary.rms_lsb, summary.heldout_lsb)
+        self.abscissae = await self.hands.ask("abscissae", bench)
+        self.on_change("history")
+        self.on_change("fit")
+        self._judge(bench)
+
+    def _tick(self, done: int) -> None:
+        self.progress += done
+
+    def _judge(self, bench: Bench) -> None:
+        """Begin to look for what is missing, unless that is known."""
+        if self.suspicion is not None:
+            self.on_change("suspects")
+            return
+        now = asyncio.get_running_loop().time()
+        if self.mind.busy and now - self._since > PATIENCE_S:
+            self.mind.stop()
+        self._since, self.thinking = now, True
+        self.on_change("suspects")
+        self._thought = asyncio.create_task(self._think(bench))
+
+    async def _think(self, bench: Bench) -> None:
+        try:
+            found = await self.mind.ask("suspects", bench)
+        except Stopped:
+            found = None
+        except BarberpoleError as error:
+            found = None
+            self.message = str(error)
+            self.on_change("message")
+        if found is not None:
+            self._judged[bench.key] = found
+        if self.history is not None and bench == self.bench:
+            self.suspicion, self.thinking = found, False
+            self.on_change("suspects")
+
+    async def add(self, suspect: Suspect) -> None:
+        """Put a suspect in, in the form it was found in."""
+        await self._add(suspect.effect, suspect.settings)
+
+    async def toggle(self, effect: str) -> None:
+        """Put an effect in or take it out."""
+        if effect in self.bench.file.effects:
+            await self.do(f"− {effect}", self.bench.with_file(without_effect(self.bench.file, effect)))
+        else:
+            known = [s for s in (self.suspicion.suspects if self.suspicion else ()) if s.effect == effect]
+            await self._add(effect, known[0].settings if known else None)
+
+    async def _add(self, effect: str, settings: dict | None) -> None:
+        task = self.hands.ask("with_effect", self.bench, effect, settings)
+        bench = await self._try(f"putting {effect} in", task)
+        if bench is not None:
+            await self.do(f"+ {effect}", bench)
+
+    async def exclude(self, box: Box) -> None:
+        """Leave the rows within a box out."""
+        bench = await self._try("leaving rows out", self.hands.ask("exclude", self.bench, box))
+        if bench is not None and bench != self.bench:
+            count = sum(last - first for first, last in bench.excluded)
+            await self.do(f"{count} rows left out", bench)
+
+    async def include_all(self) -> None:
+        """Take all rows in again."""
+        if self.bench.excluded:
+            await self.do("all rows", replace(self.bench, excluded=()))
+
+    async def do(self, label: str, bench: Bench) -> None:
+        """One step further."""
+        self.history = self.path.do(label, bench)
+        await self.refresh()
+
+    async def walk(self, to: Callable[[History], History]) -> None:
+        """Undo, redo, or go anywhere on the path."""
+        if self.history is None:
+            return
+        there = to(self.history)
+        if there.at != self.history.at:
+            self.history = there
+            await self.refresh()
+
+    async def pictures(self, view: View, wanted: tuple[str, ...]) -> dict[str, Picture]:
+        """Pictures of what is on the bench; none where it could not be fitted."""
+        found = await self._try("drawing", self.hands.ask("picture", self.bench, view, wanted))
+        return found or {}
+
+    async def select(self, box: Box) -> Chosen | None:
+        """Samples within a box."""
+        return await self._try("selecting", self.hands.ask("select", self.bench, box))
+
+    def cancel(self) -> None:
+        """Stop whatever is being computed."""
+        self.hands.stop()
+        self.mind.stop()
+        self.thinking = False
+        self.on_change("suspects")
+
+    async def _try(self, what: str, work: Awaitable):
+        """What the work gives, or None with a message."""
+        self.busy, self.progress = what, 0
+        self.on_change("busy")
+        try:
+            return await work
+        except Stopped:
+            self.message = f"stopped while {what}"
+        except BarberpoleError as error:
+            self.message = str(error)
+        finally:
+            self.busy = ""
+            self.on_change("busy")
+        self.on_change("message")
+        return None

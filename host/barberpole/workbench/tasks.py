@@ -1,0 +1,63 @@
+"""What a worker can be asked: one function for each, (lab, arguments) -> a small answer."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from barberpole.workbench.bench import Bench
+from barberpole.workbench.lab import Lab, Opened, Summary
+from barberpole.workbench.pictures import Box, Chosen, Picture, View, choose, draw
+from barberpole.workbench.suspects import Suspicion, suspicion
+from barberpole.workbench.traces import inside
+
+
+def open_log(lab: Lab, bench: Bench) -> Opened:
+    """Read a log."""
+    return lab.open(bench)
+
+
+def summary(lab: Lab, bench: Bench) -> Summary:
+    """Fit the model."""
+    return lab.summary(bench)
+
+
+def picture(lab: Lab, bench: Bench, view: View, wanted: Sequence[str]) -> dict[str, Picture]:
+    """Pictures of a fit, by name."""
+    made = draw(lab.traces(bench), view, wanted)
+    lab.drawn.update(made)
+    return {name: replace(one, samples={}) for name, one in made.items()}
+
+
+def abscissae(lab: Lab, bench: Bench) -> dict[str, str]:
+    """What the residual may be drawn against: name -> title with unit."""
+    return {a.name: a.title for a in lab.traces(bench).abscissae.values()}
+
+
+def select(lab: Lab, bench: Bench, box: Box) -> Chosen:
+    """Samples within a box drawn in a picture."""
+    return choose(lab.traces(bench), box, lab.drawn)
+
+
+def exclude(lab: Lab, bench: Bench, box: Box) -> Bench:
+    """The bench without the rows within a box."""
+    traces = lab.traces(bench)
+    rows = traces.row[inside(traces, box.against, box.x, box.y_lsb, box.channel)]
+    kept = bench.kept(lab.log(bench.log).n)
+    return bench.without(rows if isinstance(kept, slice) else np.flatnonzero(kept)[rows])
+
+
+def suspects(lab: Lab, bench: Bench) -> Suspicion:
+    """Judge the model and rank what it lacks."""
+    return suspicion(lab, bench)
+
+
+def with_effect(lab: Lab, bench: Bench, effect: str, settings: dict | None) -> Bench:
+    """The bench with one more effect."""
+    return lab.with_effect(bench, effect, settings)
+
+
+TASKS: dict[str, Callable[..., Any]] = {
+    task.__name__: task for task in (open_log, summary, abscissae, picture, select, exclude, suspects, with_effect)
+}
