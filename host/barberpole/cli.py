@@ -18,6 +18,7 @@ from barberpole.commands import (
     characterise,
     demo,
     design,
+    doctor,
     fleet,
     methods,
     trajectory,
@@ -45,6 +46,7 @@ trajectory.register(app)
 design.register(app)
 challenge.register(app)
 demo.register(app)
+doctor.register(app)
 fleet.register(app)
 workbench.register(app)
 
