@@ -21,6 +21,7 @@ from barberpole.commands import (
     doctor,
     fleet,
     methods,
+    report,
     trajectory,
     workbench,
 )
@@ -45,6 +46,7 @@ board.register(app)
 trajectory.register(app)
 design.register(app)
 challenge.register(app)
+report.register(app)
 demo.register(app)
 doctor.register(app)
 fleet.register(app)

@@ -1,9 +1,10 @@
-"""Numbers as people read them."""
+"""Numbers as people read them, and as JSON holds them."""
 
 import math
+from typing import Any
 
 
-def plain(value: float, digits: int = 4) -> str:
+def plain(value: float | None, digits: int = 4) -> str:
     """Significant figures without an exponent from 0.0001 up to a million: 303200, 0.00123, 1.2e+09."""
     if value is None or not math.isfinite(value):
         return "not known"
@@ -30,3 +31,14 @@ def uncertain(value: float, stderr: float) -> str:
     if digits > 7:
         return f"{value:.6g} ± {stderr:.2g}"
     return f"{value:.{digits}f} ± {stderr:.{digits}f}"
+
+
+def strict(value: Any) -> Any:
+    """What strict JSON can hold: numpy's numbers become plain, and what is not a finite number becomes null."""
+    if isinstance(value, dict):
+        return {key: strict(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(inner) for inner in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

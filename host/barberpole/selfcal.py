@@ -30,7 +30,8 @@ PASSES = 6  # each lessens the error of gains and offsets, at which the bridge's
 @dataclass(frozen=True)
 class SelfcalResult:
     """gain (3,) over the factory's; response_ut (3, 3) µT per unit as the factory calibration reads it; ambient_ut c of
-    (1); residual_ut rms by axis; step_ut largest change of c between blocks; offset_lsb (set + reset) / 2; temp_c mean.
+    (1); residual_ut rms by axis; step_ut largest change of c between blocks; offset_lsb (set + reset) / 2; temp_c mean;
+    left_ut (3, m) what (1) leaves at each point.
     """
 
     gain: Array
@@ -40,6 +41,7 @@ class SelfcalResult:
     step_ut: float
     offset_lsb: Array
     temp_c: float
+    left_ut: Array
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def recompute(run: SelfcalRun, fitted: Fitted, factory_ut_per_unit: Array, block
     gain, offset = np.ones(3), np.zeros(3)
     for _ in range(PASSES):
         field, drift_ut = _fields(run, fitted, _Reading(factory, gain, offset))
-        ambient, response, residual = _solve(run.unit, field)
+        ambient, response, left = _solve(run.unit, field)
         apparent = response * gain[:, None]
         gain, offset = gain * np.diag(response) / factory, offset + slope * gain * drift_ut
         if not np.all(np.isfinite(gain) & (gain > 0)):
@@ -71,10 +73,11 @@ def recompute(run: SelfcalRun, fitted: Fitted, factory_ut_per_unit: Array, block
         gain=gain,
         response_ut=apparent,
         ambient_ut=ambient,
-        residual_ut=residual,
+        residual_ut=np.sqrt(np.sum(left**2, axis=1) / (run.unit.shape[1] - UNKNOWNS)),
         step_ut=_step(field, run.header.get("block", 0) if block is None else block),
         offset_lsb=np.mean(0.5 * (run.set_lsb + run.reset_lsb), axis=1),
         temp_c=float(np.mean(run.temp_c)),
+        left_ut=left,
     )
 
 
@@ -153,14 +156,13 @@ def _fields(run: SelfcalRun, fitted: Fitted, reading: _Reading) -> tuple[Array, 
 
 
 def _solve(unit: Array, field: Array) -> tuple[Array, Array, Array]:
-    """c (3,), G (3, 3) and the residual rms (3,) of (1)."""
+    """c (3,), G (3, 3) and the residual (3, m) of (1)."""
     m = unit.shape[1]
     rows = np.vstack([np.ones(m), unit]).T
     if m <= UNKNOWNS or np.linalg.matrix_rank(rows) < UNKNOWNS:
         raise InputError(must("the coil run", "points that span all three coils", f"{m} points that do not"))
     solved = np.linalg.lstsq(rows, field.T, rcond=None)[0]
-    residual = field - (rows @ solved).T
-    return solved[0], solved[1:].T, np.sqrt(np.sum(residual**2, axis=1) / (m - UNKNOWNS))
+    return solved[0], solved[1:].T, field - (rows @ solved).T
 
 
 def _step(field: Array, block: int) -> float:

@@ -56,7 +56,7 @@ def verify(log: Log, calibration: Calibration) -> Verification:
     """Hold a log against a calibration. Raises InputError if the board ran another model, or nothing can be checked."""
     fitted = from_calibration(calibration)
     checks = [*_identity(log, calibration), *_selfcal(log, calibration, fitted)]
-    if not _coils_driven(log):
+    if not coils_driven(log):
         checks += _readings(log, calibration, fitted)
     if not checks:
         got = "a coil run without its verdict"
@@ -91,11 +91,11 @@ def _selfcal(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Che
         {"selfcal_accepted": accepted, "selfcal_reasons": codes, "in_force": result.get("in_force")},
     )
     if log.selfcal is not None and calibration.selfcal is not None:
-        again = recompute(log.selfcal, fitted, _factory_response(log.selfcal, calibration.selfcal))
+        again = recompute(log.selfcal, fitted, factory_response(log.selfcal, calibration.selfcal))
         yield from _gains(result, again)
 
 
-def _factory_response(run: SelfcalRun, reference: SelfcalReference) -> np.ndarray:
+def factory_response(run: SelfcalRun, reference: SelfcalReference) -> np.ndarray:
     """(3, 3) µT per unit of this run's currents, which need not be the factory's."""
     response = np.asarray(reference.gain_ut_per_unit)
     today_ma = run.header.get("unit_ma")
@@ -120,7 +120,7 @@ def _gains(result: dict, again: SelfcalResult) -> Iterator[Check]:
         )
 
 
-def _coils_driven(log: Log) -> bool:
+def coils_driven(log: Log) -> bool:
     """Whether the rows are points of a coil run, whose field is not the ambient one."""
     currents = log.stack(CURRENT)
     return currents is not None and bool(np.max(np.abs(currents)) > DRIVEN_MA)

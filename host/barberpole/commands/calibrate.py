@@ -18,6 +18,7 @@ from barberpole.diagnose import compare as compare_fit
 from barberpole.diagnose import diagnose as diagnose_log
 from barberpole.effects import Effect
 from barberpole.errors import BarberpoleError, InputError, must
+from barberpole.fit.answer import fit_json
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.log import Log, read_log, write_log
 from barberpole.modelfile import ModelFile, add_effect, read_model, remove_effect, write_model
@@ -70,7 +71,7 @@ def fit(
     if output:
         write_calibration(calibration, output)
     if as_json:
-        print_json(show.fit_json(found, data) | published.to_json(answer, method))
+        print_json(fit_json(found, data.skipped) | published.to_json(answer, method))
     else:
         notes(data.notes)
         show.fit_tables(found, output)
@@ -104,11 +105,12 @@ def compare(
     """Hold the model against the measurement: residual by axis and against every covariate."""
     data, file = read_log(log), read_model(model)
     seen, extra = _seen(data, file, sensor)
-    found = compare_fit(fit_observations(seen, file, extra), extra=extra)
+    made = fit_observations(seen, file, extra)
+    found = compare_fit(made, extra=extra)
     if output:
         from barberpole.report.comparison import write_comparison  # here: drawing is slow to load
 
-        write_comparison(found, output, log.name, model)
+        write_comparison(found, made, output, log.name, model)
     if as_json:
         print_json(found.to_json())
     else:

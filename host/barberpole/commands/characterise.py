@@ -8,13 +8,13 @@ import typer
 
 from barberpole import __version__
 from barberpole.board import load_sensor
-from barberpole.characterise.page import uncertain, write_sheet
 from barberpole.characterise.sheet import Sheet, make_sheet
 from barberpole.characterise.simulate import readings
 from barberpole.columns import FIELD, READINGS
 from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
 from barberpole.errors import InputError, must
 from barberpole.log import Log, read_log, write_log
+from barberpole.numbers import uncertain
 from barberpole.sensor import Sensor
 from barberpole.trajectory.programs import FREQUENCIES_HZ, SINE_PEAK_TO_PEAK_UT, lin_60000
 
@@ -39,6 +39,8 @@ def characterise(
     read = [read_log(path) for path in logs]
     sheet = make_sheet(read)
     if output:
+        from barberpole.characterise.page import write_sheet  # here: drawing is slow to load
+
         hashes = "\n".join(f"{log.path.name}  {log.sha256}" for log in read)
         write_sheet(output, f"Data sheet: {name}", sheet, f"barberpole {__version__}\n{hashes}")
     if as_json:

@@ -1,7 +1,6 @@
 """What the commands share: JSON on stdout, tables for people, progress on stderr."""
 
 import json
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +9,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from barberpole.numbers import strict
 
 # No markup: a path or a column's name may hold brackets. Sentences are not wrapped: a line is a line in a pipe too.
 OUT = Console(highlight=False, markup=False, soft_wrap=True)
@@ -20,17 +21,7 @@ AS_JSON = typer.Option(False, "--json", help="Print one JSON object and nothing 
 
 def print_json(answer: dict[str, Any]) -> None:
     """One line of strict JSON: what is not a finite number becomes null."""
-    print(json.dumps(_strict(answer)), flush=True)
-
-
-def _strict(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _strict(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_strict(inner) for inner in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    print(json.dumps(strict(answer)), flush=True)
 
 
 def table(title: str, *heads: str) -> Table:

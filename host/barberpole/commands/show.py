@@ -1,4 +1,4 @@
-"""Answers as tables for people, and the JSON that is not already an object's own."""
+"""Answers as tables for people."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,26 +8,11 @@ from barberpole.commands.console import OUT, table
 from barberpole.diagnose import Comparison, Diagnosis, Pattern
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
-from barberpole.log import Log
+from barberpole.numbers import plain
+from barberpole.summary import Summary
 from barberpole.verify import Verification
 
 MANY = 12  # patterns shown to a person; --json has all
-
-
-def fit_json(fit: Fit, log: Log) -> dict:
-    """The object of `fit --json`."""
-    rows = zip(fit.model.names, fit.model.params, fit.p, fit.stderr, fit.free, strict=True)
-    return {
-        "n": fit.problem.n,
-        "rms_lsb": fit.rms_lsb,
-        "rms_ut": fit.rms_ut(),
-        "rms_norm_percent": fit.rms_norm_percent(),
-        "heldout_rms_lsb": fit.heldout_rms_lsb,
-        "parameters": {n: {"value": v, "stderr": s, "unit": q.unit} for n, q, v, s, free in rows if free},
-        "converged": fit.converged,
-        "unobservable": list(fit.unobservable),
-        "skipped": log.skipped,
-    }
 
 
 def fit_tables(fit: Fit, output: Path | None) -> None:
@@ -118,3 +103,52 @@ def catalogue(effects: Sequence[Effect]) -> None:
     for effect in effects:
         shown.add_row(effect.name, effect.equation, effect.source)
     OUT.print(shown)
+
+
+def summary(found: Summary) -> None:
+    """A log in one screen."""
+    OUT.print(f"{found.log}: {found.rows} rows{_skipped(found)}", style="bold")
+    for line in _facts(found):
+        OUT.print(line)
+    shown = table("", "column", "least", "mean", "greatest", "unit")
+    shown.columns[-1].justify = "left"
+    for c in found.columns:
+        shown.add_row(c.name, plain(c.low), plain(c.mean), plain(c.high), c.unit)
+    OUT.print(shown)
+    OUT.print(f"can show: {', '.join(found.shows) or 'no effect'}")
+    reasons: dict[str, list[str]] = {}
+    for effect, why in found.cannot_show.items():
+        reasons.setdefault(why, []).append(effect)
+    for why, effects in reasons.items():
+        OUT.print(f"cannot show: {', '.join(effects)} ({why})")
+    for note in found.notes:
+        OUT.print(f"note: {note}", style="dim")
+
+
+def _skipped(found: Summary) -> str:
+    return f", {found.skipped} more damaged or incomplete" if found.skipped else ""
+
+
+def _facts(found: Summary) -> list[str]:
+    """What is not a column, a line each."""
+    of = {"vector": "the field is known", "magnitude": "its magnitude is known", "constant": "not known, but constant"}
+    span = "" if found.field_ut is None else f", {plain(found.field_ut[0])} to {plain(found.field_ut[1])} µT"
+    lines = [f"readings      {found.form}; {found.flips} flips", f"reference     {of[found.reference]}{span}"]
+    if found.duration_s is not None:
+        rate = f"{plain(found.duration_s)} s at {plain(found.rate_hz)} Hz" if found.rate_hz else "times repeat"
+        gaps = f"{found.gaps} gaps, the longest {plain(found.longest_gap_s)} s" if found.gaps else "no gaps"
+        lines.append(f"time          {rate}; {gaps}")
+    else:
+        lines.append("time          no t_s column")
+    share = f"{100 * found.directions / found.directions_of:.0f} %"
+    lines.append(f"directions    {found.directions} of {found.directions_of} ({share}) seen")
+    if found.temp_span_c is not None:
+        lines.append(f"temperature   spans {plain(found.temp_span_c, 3)} °C")
+    lines.append(
+        f"at rest       {found.still_rows} rows together" if found.still_rows else "at rest       never for long"
+    )
+    spiked = ", ".join(f"{axis} {count}" for axis, count in found.spikes.items() if count)
+    lines.append(f"spikes        {spiked or 'none'}")
+    if found.selfcal_points:
+        lines.append(f"coil run      {found.selfcal_points} points")
+    return lines

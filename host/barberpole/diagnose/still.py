@@ -39,18 +39,29 @@ def still(seen: Observations) -> Still | None:
     n = seen.y.shape[1]
     if n < 20 or seen.reference == "vector":
         return None
-    if _on_a_closed_surface(seen.y):
+    y = level(seen)
+    if _on_a_closed_surface(y):
         return None
-    noise = np.sqrt(np.mean(np.diff(seen.y, axis=1) ** 2, axis=1) / 2.0)
-    causes = {name: _left(seen.y, basis) for name, basis in _causes(seen).items()}
+    noise = np.sqrt(np.mean(np.diff(y, axis=1) ** 2, axis=1) / 2.0)
+    causes = {name: _left(y, basis) for name, basis in _causes(seen).items()}
     best = min((np.max(left / np.maximum(noise, 1e-300)) for left in causes.values()), default=np.inf)
-    total = np.std(seen.y, axis=1)
+    total = np.std(y, axis=1)
     if min(best, float(np.max(total / np.maximum(noise, 1e-300)))) > QUIET:
         return None
     rms, floor = float(np.sqrt(np.mean(total**2))), float(np.sqrt(np.mean(noise**2)))
     if rms < DRIFTED * floor:
         return Still(rms, floor, (), (), "the sensor did not move: turn it through all directions")
-    return Still(rms, floor, _names(causes), _patterns(seen.y, causes), ONE_WAY)
+    return Still(rms, floor, _names(causes), _patterns(y, causes), ONE_WAY)
+
+
+def level(seen: Observations) -> np.ndarray:
+    """Readings (3, n) less the mean of their state: what a bridge's own offset alternates by is no motion."""
+    state = np.broadcast_to(np.asarray(seen.at.state, float), seen.y.shape[1:])
+    out = seen.y.copy()
+    for kind in np.unique(state):
+        own = state == kind
+        out[:, own] -= out[:, own].mean(axis=1, keepdims=True)
+    return out
 
 
 def _on_a_closed_surface(y: np.ndarray) -> bool:

@@ -71,7 +71,7 @@ def noise_line(
         figure.add_hline(y=noise, line={"dash": "dash"})
         # an annotation on a logarithmic axis stands at the logarithm of its place, a line does not
         at = float(np.log10(noise)) if logarithmic else noise
-        place = {"x": 1, "xref": "x domain", "xanchor": "right", "y": at, "yanchor": "bottom"}
+        place = {"x": 0, "xref": "x domain", "xanchor": "left", "xshift": 4, "y": at, "yanchor": "bottom"}
     else:
         figure.add_vline(x=noise, line={"dash": "dash"})
         place = {"x": noise, "xanchor": "left", "xshift": -4, "y": 1, "yref": "y domain", "yanchor": "bottom"}

@@ -70,7 +70,7 @@ def _sentence(names: list[str], sigma: dict[str, float], text: list[str], what: 
 
 def _said(name: str, values: Mapping[str, Value], factory: Mapping[str, Value]) -> str:
     now = values[name]
-    unit = f" {now.unit}" if now.unit not in ("", "1") else ""
+    unit = f" {now.unit.replace('uT', 'µT')}" if now.unit not in ("", "1") else ""
     said = f"{name} {uncertain(now.value, now.stderr)}{unit}"
     if name in factory:
         return f"{said}, factory {uncertain(factory[name].value, factory[name].stderr)}{unit}"

@@ -44,29 +44,23 @@ def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
     left = np.array([s.heldout_lsb for s in stages])
     steep = np.isfinite(noise_lsb) and left.max() > LOGARITHMIC * max(noise_lsb, 1e-300)
     figure = plot("", "held-out error, LSB rms", 340)
-    names = [f"{at}: {s.name}" if at else s.name for at, s in enumerate(stages)]
-    change = left[1:] - left[:-1]
+    place, change = list(range(len(stages))), left[1:] - left[:-1]
     figure.add_bar(
-        x=names[1:],
+        x=place[1:],
         y=np.abs(change),
         base=np.minimum(left[1:], left[:-1]),
-        width=0.28,
+        width=0.3,
         marker={"color": [AFTER if c < 0 else BEFORE for c in change], "opacity": 0.55},
-        text=[f"{100 * c / b:+.0f} %" for c, b in zip(change, left[:-1], strict=True)],
         hoverinfo="skip",
         showlegend=False,
     )
-    figure.add_scatter(
-        x=names,
-        y=left,
-        mode="markers+text",
-        text=[plain(v) for v in left],
-        textposition="middle right",
-        marker={"color": BLUE, "size": 10, "symbol": "diamond"},
-        cliponaxis=False,
-        showlegend=False,
-    )
-    figure.update_xaxes(categoryorder="array", categoryarray=names, range=[-0.5, len(names) - 0.3])
+    dots = {"color": BLUE, "size": 10, "symbol": "diamond"}
+    names = [s.name for s in stages]
+    said = "%{text}: %{y:.4g} LSB<extra></extra>"
+    how = {"mode": "markers", "text": names, "hovertemplate": said, "marker": dots}
+    figure.add_scatter(x=place, y=left, cliponaxis=False, showlegend=False, **how)
+    labels = [_label(s, before) for s, before in zip(stages, [None, *left[:-1]], strict=True)]
+    figure.update_xaxes(tickvals=place, ticktext=labels, tickangle=0, range=[-0.5, len(place) - 0.5], showgrid=False)
     if steep:
         figure.update_yaxes(type="log", **DECADES)
     else:
@@ -74,6 +68,13 @@ def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
     if np.isfinite(noise_lsb):
         noise_line(figure, noise_lsb, logarithmic=bool(steep))
     return Figure(figure, *_words(stages, noise_lsb))
+
+
+def _label(stage: Stage, before: float | None) -> str:
+    """Name, error and change under a stage; a long name is broken where it can be."""
+    name = stage.name.replace("_", "_<br>", 1).replace(", ", ",<br>")
+    change = "" if before is None else f" ({100 * (stage.heldout_lsb / before - 1.0):+.0f} %)"
+    return f"{name}<br><b>{plain(stage.heldout_lsb)}</b>{change}"
 
 
 def _words(stages: Sequence[Stage], noise: float) -> tuple[str, str]:
