@@ -15,6 +15,7 @@ from tomlkit.items import Table
 from barberpole.calibration_tables import (
     CalibrationTables,
     ModelTable,
+    PriorTable,
     Residual,
     SelfcalReference,
     Step,
@@ -28,6 +29,7 @@ from barberpole.tables import read_toml, validate
 
 __all__ = [
     "Calibration",
+    "PriorTable",
     "Residual",
     "SelfcalReference",
     "Step",
@@ -61,6 +63,7 @@ class Calibration:
     validity: Validity = field(default_factory=Validity)
     history: tuple[Step, ...] = ()
     selfcal: SelfcalReference | None = None
+    prior: PriorTable | None = None
     easy_axis: tuple[int, int, int] = (1, 0, 1)
     t0_c: float = 25.0
     method: str = "fit"
@@ -93,6 +96,7 @@ def read_calibration(path: str | Path) -> Calibration:
         validity=file.validity,
         history=file.history,
         selfcal=file.selfcal,
+        prior=file.prior,
         easy_axis=file.easy_axis,
         t0_c=file.t0_c,
         method=file.method,
@@ -114,7 +118,7 @@ def calibration_text(calibration: Calibration, path: Path) -> str:
         document[key] = _plain(getattr(calibration, key))
     document["model"] = _model_table(calibration.model, path)
     document["log"] = {"name": calibration.log_name, "sha256": calibration.log_sha256}
-    for key in ("residual", "validity", "selfcal"):
+    for key in ("residual", "validity", "selfcal", "prior"):
         if (table := getattr(calibration, key)) is not None:
             document[key] = _table(table)
     document["parameters"] = _parameters(calibration.parameters)

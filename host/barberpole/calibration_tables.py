@@ -81,6 +81,24 @@ class SelfcalReference:
 
 
 @dataclass(frozen=True, config=STRICT)
+class PriorTable:
+    """The lot whose distribution stood beside the log in the fit."""
+
+    source: str
+    """Name of the fleet's file."""
+    sha256: str
+    """Hash of the fleet's file."""
+    boards: int
+    """How many boards it was taken from."""
+    mean: dict[str, Real]
+    """The lot's mean of each parameter."""
+    width: dict[str, Real]
+    """Standard deviation of a further board's value."""
+    lot: str | None = None
+    """Name of the lot, where the fleet holds several."""
+
+
+@dataclass(frozen=True, config=STRICT)
 class ModelTable:
     """The model file's content, plugins named relative to the calibration file."""
 
@@ -122,4 +140,5 @@ class CalibrationTables:
     parameters: dict[str, dict[str, Value]]
     covariance: CovarianceTable
     selfcal: SelfcalReference | None = None
+    prior: PriorTable | None = None
     history: tuple[Step, ...] = ()

@@ -1,5 +1,6 @@
 """fit, compare, diagnose, add, remove, verify, convert: what is done with a log and a model."""
 
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ from barberpole.adding import Change, change
 from barberpole.board import load_sensor
 from barberpole.calibrating import calibration_of, with_selfcal
 from barberpole.calibration import Calibration, read_calibration, write_calibration
-from barberpole.calibration_tables import Step
+from barberpole.calibration_tables import PriorTable, Step
 from barberpole.commands import methods as published
 from barberpole.commands import show
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
@@ -30,6 +31,9 @@ from barberpole.verify import verify as verify_log
 LogPath = Annotated[Path, typer.Argument(help="CSV, Parquet or board records (.bpr).")]
 ModelOption = Annotated[str, typer.Option("--model", help="model.toml, or a list such as bias,scale,misalignment.")]
 OutOption = Annotated[Path | None, typer.Option("-o", "--output", help="Where to write calibration.toml.")]
+PriorOption = Annotated[
+    Path | None, typer.Option(help="Table of a fleet fit: its lot's distribution stands beside a short log.")
+]
 SensorOption = Annotated[str | None, typer.Option("--sensor", help="Sensor name or .toml: easy axes and H_k.")]
 
 
@@ -50,28 +54,37 @@ def fit(
     magnitude: MagnitudeOption = None,
     place: PlaceOption = None,
     date: DateOption = None,
+    prior: PriorOption = None,
+    lot: Annotated[str | None, typer.Option(help="The lot of --prior, where that fleet holds several.")] = None,
     as_json: bool = AS_JSON,
 ) -> None:
     """Fit a model to a log and write the calibration."""
     if not (model or method):
         raise InputError(must("fit", "given --model or --method", "neither"))
+    if prior and (method or not model):
+        raise InputError(must("--prior", "used with --model", "--method"))
     data = read_log(log)
     known_ut = magnitude_ut(data, magnitude, place, date)
     answer = published.run(data, method, model, sensor, against, known_ut) if method else None
     if answer and answer.fit is None:
         published.write_and_show(answer, data, method or "", output, as_json)
         return
-    found, file = (
-        (answer.fit, answer.file) if answer and answer.fit and answer.file else _by_model(data, model, sensor, known_ut)
-    )
-    calibration = calibration_of(found, data, file, method or "fit")
+    stated = None
+    if answer and answer.fit and answer.file:
+        found, file = answer.fit, answer.file
+    elif prior:
+        found, file, stated = _by_prior(data, model, sensor, known_ut, prior, lot)
+    else:
+        found, file = _by_model(data, model, sensor, known_ut)
+    calibration = replace(calibration_of(found, data, file, method or "fit"), prior=stated)
     run = read_log(selfcal).selfcal if selfcal else data.selfcal
     if run is not None:
         calibration = with_selfcal(calibration, run, _sensor_of(data, file, sensor) or load_sensor("hmc1021_1022"))
     if output:
         write_calibration(calibration, output)
     if as_json:
-        print_json(fit_json(found, data.skipped) | published.to_json(answer, method))
+        beside = {"prior": asdict(stated)} if stated else {}
+        print_json(fit_json(found, data.skipped) | published.to_json(answer, method) | beside)
     else:
         notes(data.notes)
         show.fit_tables(found, output)
@@ -83,6 +96,19 @@ def _by_model(data: Log, model: str, sensor: str | None, known_ut: float | None)
     seen, extra = _seen(data, file, sensor)
     with progress("fit", None) as tick:
         return fit_observations(seen, file, extra, tick), file
+
+
+def _by_prior(
+    data: Log, model: str, sensor: str | None, known_ut: float | None, prior: Path, lot: str | None
+) -> tuple[Fit, ModelFile, PriorTable]:
+    from barberpole.fit.prior import fit_with_prior  # here: few fits need it
+    from barberpole.fleet.prior import prior_of, stated
+    from barberpole.fleet.table import read_fleet
+
+    file = with_magnitude(read_model(model), known_ut)
+    seen, extra = _seen(data, file, sensor)
+    known = prior_of(read_fleet(prior), file, lot)
+    return fit_with_prior(seen, file, known, extra), file, stated(known)
 
 
 def _seen(data: Log, file: ModelFile, sensor: str | None = None) -> tuple[Observations, tuple[Effect, ...]]:

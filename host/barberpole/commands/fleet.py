@@ -108,7 +108,7 @@ def diagnose(
     dask: Dask = None,
     as_json: bool = AS_JSON,
 ) -> int:
-    """Diagnose every log: one row each, with verdict, suspects and patterns."""
+    """Diagnose every log, and keep what each effect would take of it: `fleet report` adds that up over the boards."""
     return _any(_run("diagnose", logs, output, model, None, sensor, name, processes, dask, as_json))
 
 

@@ -102,6 +102,7 @@ def _verify(log: Log, settings: Settings) -> Row:
 
 def _diagnose(log: Log, settings: Settings) -> Row:
     from barberpole.diagnose import diagnose
+    from barberpole.fleet.scores import scores
 
     file = _model(settings)
     extra = _plugins(file.plugins)
@@ -109,6 +110,7 @@ def _diagnose(log: Log, settings: Settings) -> Row:
     row: Row = {}
     if said.fits:
         row = fitted_row(said.fits[0], calibration_of(said.fits[0], log, file))
+        row["scores"] = json.dumps(_plain(scores(said.fits[0], file, log.has("state"), extra)))
     shown = said.to_json()
     row |= {key: shown[key] for key in ("verdict", "noise_lsb", "rms_lsb", "cannot_be_seen", "next_experiment")}
     return row | {key: json.dumps(_plain(shown[key])) for key in ("suspects", "patterns", "cannot_be_judged")}
