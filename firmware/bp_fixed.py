@@ -1,5 +1,5 @@
 # bp_fixed.py: the hot path in machine code: sums, fixed-point arithmetic, float32, check sum, base64. None allocates.
-# It stays text on a board and is compiled there, for whatever processor it meets; bp_native does without it if need be.
+# A build holds it for the Cortex-M4; for another processor it is compiled anew; bp_native does without it if need be.
 # A value v is n 2^(k-30) with |n| < 2^30; the generator has proved that no result leaves that (bp_hot). The same comes
 # out with words of 32 and of 64 bits: a register is read as its lower 31 bits with sign, `(n & mask ^ sign) - sign`,
 # and no number in here exceeds the small integers of a 32-bit MicroPython.

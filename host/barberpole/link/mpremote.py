@@ -3,7 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from barberpole.errors import PortError, must
 
@@ -30,11 +30,16 @@ def require_port(port: str) -> None:
         raise PortError(must("the port", "an attached board", f"{port}, which does not exist"))
 
 
-def copy(port: str, files: Sequence[tuple[Path, str]]) -> None:
-    """Copy files to paths on the board in one session, making their folders; files already the same are skipped."""
-    folders = sorted({Path(target).parent.as_posix() for _, target in files} - {"/", "."})
-    make = "import os\n" + "".join(f"try: os.mkdir({f!r})\nexcept OSError: pass\n" for f in folders)
-    words = ["exec", make]
+def copy(port: str, files: Sequence[tuple[Path, str]], first: str = "") -> None:
+    """Copy files to paths on the board in one session; files already the same are skipped.
+
+    Their folders are made, and then the program `first` is run there.
+    """
+    parents = {parent.as_posix() for _, target in files for parent in PurePosixPath(target).parents}
+    make = "import os\n" + "".join(
+        f"try: os.mkdir({f!r})\nexcept OSError: pass\n" for f in sorted(parents - {"/", "."})
+    )
+    words = ["exec", make + first]
     for source, target in files:
         words += ["+", "fs", "cp", str(source), f":{target}"]
     run(port, *words)
@@ -61,7 +66,16 @@ def hashes(port: str, paths: Sequence[str]) -> dict[str, str]:
         " except OSError: print(p, '-')\n"
     )
     lines = [line.split() for line in run(port, "exec", program).splitlines() if line.strip()]
-    return {path: "" if digest == "-" else digest for path, digest in lines}
+    try:
+        return {path: "" if digest == "-" else digest for path, digest in lines}
+    except ValueError:
+        raise PortError(must("the board's answer", "a hash of each file", str(lines[-1]), port)) from None
+
+
+def remove(port: str, paths: Sequence[str]) -> None:
+    """Remove files; those that cannot be (folders, read-only places) stay."""
+    each = f"import os\nfor p in {tuple(paths)!r}:\n try: os.remove(p)\n except OSError: pass\n"
+    run(port, "exec", each)
 
 
 def reset(port: str) -> None:

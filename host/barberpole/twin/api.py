@@ -21,7 +21,7 @@ import barberpole
 from barberpole.board import Board
 from barberpole.errors import InputError, PortError, must
 from barberpole.twin.faults import check_faults
-from barberpole.twin.flash import make_image
+from barberpole.twin.flash import make_frozen, make_image, make_partition
 from barberpole.twin.interpreter import find_micropython
 from barberpole.twin.pins import check_pins
 from barberpole.twin.process import Power
@@ -44,9 +44,13 @@ class Twin:
         seed: int = 0,
         faults: Iterable[str] = (),
         files: Mapping[str, str | Path] | None = None,
+        romfs_kib: int = 0,
+        frozen: str | Path | None = None,
     ):
         """`seed` sets noise and magnetisation at power-up; `files` maps paths on the board to files to put there.
 
+        romfs_kib: size of the ROMFS partition of the board's firmware; 0: none, as in stock firmware. frozen: a build
+        folder whose modules and main program stand in for those frozen into the firmware.
         Raises InputError for an unknown fault or pin, a missing interpreter or files that do not fit.
         """
         self.world = World.of(board) if world is None else world
@@ -54,6 +58,7 @@ class Twin:
         self._board, self._seed, self._faults = board, check_seed(seed), check_faults(faults)
         self._image = (Path(flash_dir) / f"{board.name}.lfs2").resolve()
         self._files = files or {}
+        self._romfs_kib, self._frozen = romfs_kib, frozen
         self._process: subprocess.Popen | None = None
         self.port = ""
 
@@ -61,12 +66,18 @@ class Twin:
         micropython = find_micropython()
         make_image(self._image, self._board.filesystem_kib, self._files, micropython)
         try:
-            self._start(Job(self._board, micropython, self._image))
+            self._start(Job(self._board, micropython, self._image, *self._in_firmware()))
             self.power_cycle()
         except BaseException:
             self.close()
             raise
         return self
+
+    def _in_firmware(self) -> tuple[Path | None, Path | None]:
+        """What another firmware than the stock one has: the files of the ROMFS partition and of frozen modules."""
+        romfs = make_partition(self._image.with_suffix(".romfs"), self._romfs_kib) if self._romfs_kib else None
+        frozen = make_frozen(self._image.with_suffix(".frozen"), Path(self._frozen)) if self._frozen else None
+        return romfs, frozen
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()

@@ -22,11 +22,13 @@ def run_twin(
     seed: int = 0,
     flash_dir: str | Path | None = None,
     faults: Iterable[str] = (),
+    romfs_kib: int = 0,
+    frozen: str | Path | None = None,
 ) -> None:
     """Start the board, print its port as the first line, and keep it until Ctrl-C or SIGTERM.
 
     hidden: effects of world.HIDDEN ("none": an ideal sensor; empty: its cross-field effect). flash_dir: where the
-    flash image is kept; None: nowhere, the board starts empty. Raises BarberpoleError.
+    flash image is kept; None: nowhere, the board starts empty. romfs_kib, frozen: as of Twin. Raises BarberpoleError.
     """
     board = load_board(board_name)
     world = World.of(board, tuple(hidden) or DEFAULT_HIDDEN)
@@ -34,7 +36,7 @@ def run_twin(
         folder = flash_dir or stack.enter_context(tempfile.TemporaryDirectory(prefix="barberpole-twin-"))
         signal.signal(signal.SIGTERM, _stop)
         with contextlib.suppress(KeyboardInterrupt):
-            twin = stack.enter_context(Twin(board, folder, world, seed, faults))
+            twin = stack.enter_context(Twin(board, folder, world, seed, faults, None, romfs_kib, frozen))
             print(twin.port, flush=True)
             while True:
                 time.sleep(ALIVE_S)

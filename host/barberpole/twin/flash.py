@@ -6,12 +6,16 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
+from barberpole.built import for_processor, read_built, romfs_image
 from barberpole.errors import InputError, must
+from barberpole.files import write_atomic
+from barberpole.mpy import ARCHITECTURES
 from barberpole.twin.interpreter import SHIMS
 
 ERASED = b"\xff"
 KIB = 1024
 FILL_TIMEOUT_S = 60
+INTERPRETER = ARCHITECTURES.index("x64")  # of the unix interpreter
 
 
 def make_image(path: Path, size_kib: int, files: Mapping[str, str | Path], micropython: str) -> None:
@@ -27,6 +31,19 @@ def make_image(path: Path, size_kib: int, files: Mapping[str, str | Path], micro
         raise InputError(must("the flash folder", "one that can be written", error.strerror, path.parent)) from None
     if files:
         _fill(path, files, micropython)
+
+
+def make_partition(path: Path, size_kib: int) -> Path:
+    """An erased ROMFS partition at `path`, kept when it is there. Raises InputError when it cannot be written."""
+    make_image(path, size_kib, {}, "")
+    return path
+
+
+def make_frozen(path: Path, build: Path) -> Path:
+    """A build's modules and main program as the image that stands in for frozen ones. Raises InputError."""
+    files, _ = for_processor(read_built(build), INTERPRETER)
+    write_atomic(path, romfs_image({Path(target).name: data for target, data in files.items()}))
+    return path
 
 
 def _fill(path: Path, files: Mapping[str, str | Path], micropython: str) -> None:

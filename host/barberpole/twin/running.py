@@ -29,6 +29,10 @@ class Job:
     board: Board
     micropython: str
     image: Path
+    romfs: Path | None = None
+    """Content of the ROMFS partition, where the board's firmware has one."""
+    frozen: Path | None = None
+    """Image of the modules that stand in for frozen ones."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class Running:
         self._say = say
         self._console = Console(start.raw)
         self._wire = Wire(soldered, self._on_op, start.now_us)
-        self._interpreter = Interpreter(job.micropython, heap_bytes(job.board), self._setup(job, start))
+        self._interpreter = Interpreter(job.micropython, _heap_bytes(job), self._setup(job, start))
         self._wire.close_far_ends()
         self._started = self._ready = self._hard = False
         self._pending = b""  # input that waits for the prompt
@@ -98,6 +102,8 @@ class Running:
             "raw": start.raw,
             "cause": start.cause,
             "image": str(job.image),
+            "romfs": str(job.romfs or ""),
+            "frozen": str(job.frozen or ""),
             "pins": PINS,
             "drdy": board.adc.drdy_pin,
             "adc_reset": board.adc.reset_pin,
@@ -191,3 +197,9 @@ class Running:
 def heap_bytes(board: Board) -> int:
     """The board's heap, doubled: objects of the 64-bit interpreter are twice the size."""
     return 2 * 1024 * max(board.ram_kib - PORT_RAM_KIB, 32)
+
+
+def _heap_bytes(job: Job) -> int:
+    """With room for what lies in flash on a board."""
+    in_flash = (path.stat().st_size for path in (job.romfs, job.frozen) if path)
+    return heap_bytes(job.board) + sum(in_flash)

@@ -2,6 +2,7 @@
 import gc
 import sys
 
+import _rom
 import _twin
 import os
 import vfs
@@ -33,6 +34,7 @@ def provide_modules():
 
 def mount_flash():
     flash = Flash(_twin.setup["image"], charge_write)
+    folders = _rom.provide(charge_write)
     vfs.umount("/")
     try:
         disk = vfs.VfsLfs2(flash)
@@ -41,7 +43,7 @@ def mount_flash():
         disk = vfs.VfsLfs2(flash)
     vfs.mount(disk, "/")
     os.chdir("/")
-    sys.path[:] = ["", ".frozen", "/lib"]
+    _rom.mount(folders)
 
 
 def charge_write():
@@ -50,9 +52,11 @@ def charge_write():
 
 
 def run(path, names):
+    source = _rom.frozen_text(path)
     try:
-        with open(path) as file:
-            source = file.read()
+        if source is None:
+            with open(path) as file:
+                source = file.read()
     except OSError:
         return
     try:
