@@ -16,6 +16,7 @@ from barberpole_codegen import build
 
 ROMFS_KIB = 128
 PATIENCE_S = 30.0
+CHANGED = 12
 GAIN_NOISE = 3e-5  # three times the standard error of a gain from one coil run
 
 
@@ -101,7 +102,6 @@ def test_the_plug_pulled_while_copying_leaves_the_former_build_and_the_rest_is_c
     first, second = built
     twin = started()
     flash(first.folder, twin.port)
-    changed = replace_all(second)
     copy = mpremote.copy
 
     def cut(port, pairs, before=""):
@@ -110,21 +110,45 @@ def test_the_plug_pulled_while_copying_leaves_the_former_build_and_the_rest_is_c
         raise PortError("the cable is out")
 
     monkeypatch.setattr(installing.mpremote, "copy", cut)
-    monkeypatch.setattr("barberpole.link.deploy.read_built", lambda _: changed)
+    monkeypatch.setattr("barberpole.link.deploy.read_built", lambda _: changed(second))
     with pytest.raises(PortError):
         flash(second.folder, twin.port)
     monkeypatch.setattr(installing.mpremote, "copy", copy)
     assert power_up(twin)[0]["calibration"] == first.calibration  # whole, as if nothing had been
     done = flash(second.folder, twin.port)
-    assert len(done.copied) == len(changed.files) - 7
+    assert len(done.copied) == CHANGED - 7
     assert power_up(twin)[0]["calibration"] == second.calibration
 
 
-def replace_all(built):
-    """The build as if every file of it were new."""
+def changed(built):
+    """The build as if another dozen of its files were new, the main program among them."""
     read = read_built(built.folder)
-    longer = {path: data + (b"\n# new\n" if path == "main.py" else b"\0") for path, data in read.files.items()}
-    return replace(read, files=longer)
+    paths = [*list(read.files)[: CHANGED - 1], "main.py"]
+    longer = {path: read.files[path] + (b"\n# new\n" if path == "main.py" else b"\0") for path in paths}
+    texts = {path: text + "\nNEW = 1\n" for path, text in read.texts.items()}
+    return replace(read, files=read.files | longer, texts=texts)
+
+
+def test_without_room_for_both_an_interrupted_board_does_nothing(built, started, monkeypatch):
+    first, second = built
+    twin = started()
+    flash(first.folder, twin.port)
+    monkeypatch.setattr(installing, "SPARE_BYTES", 1 << 20)
+    monkeypatch.setattr("barberpole.link.deploy.read_built", lambda _: changed(second))
+    copy = mpremote.copy
+
+    def cut(port, pairs, before=""):
+        copy(port, pairs[:7], before)
+        raise PortError("the cable is out")
+
+    monkeypatch.setattr(installing.mpremote, "copy", cut)
+    with pytest.raises(PortError):
+        flash(second.folder, twin.port)
+    assert power_up(twin) == (None, None)
+    assert "barberpole is not complete" in twin.log_text
+    monkeypatch.setattr(installing.mpremote, "copy", copy)
+    assert len(flash(second.folder, twin.port).copied) == CHANGED - 7 + 1  # and bp_main, taken away meanwhile
+    assert power_up(twin)[0]["calibration"] == second.calibration
 
 
 @pytest.mark.parametrize("moved", [0, 9])
@@ -136,7 +160,7 @@ def test_the_plug_pulled_while_moving_is_mended_by_the_board(built, started, mon
     halfway = halfway[: halfway.index("os.remove")]
 
     monkeypatch.setattr(installing, "_MOVE", halfway + "raise OSError('the plug is pulled')\n")
-    monkeypatch.setattr("barberpole.link.deploy.read_built", lambda _: replace_all(second))
+    monkeypatch.setattr("barberpole.link.deploy.read_built", lambda _: changed(second))
     with pytest.raises(PortError, match="the plug is pulled"):
         flash(second.folder, twin.port)
     assert power_up(twin)[0]["calibration"] == second.calibration

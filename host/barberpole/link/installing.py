@@ -2,7 +2,7 @@
 
 New files are copied beside their places, compared there, and then moved; the moves are noted on the board first, and
 main.py finishes them where the power went in between. So a cable or a plug pulled at any time leaves the former
-build, or the new one. What has already arrived is not copied again.
+build, or the new one; where there is no room for both, none. What has already arrived is not copied again.
 """
 
 import tempfile
@@ -16,6 +16,7 @@ from barberpole.link.asking import BoardState
 
 STAGE = "lib/bp.new"  # as in firmware/main.py
 READY = "ready"
+RUNS = "lib/bp_main.mpy"
 SPARE_BYTES = 4096  # of the file system, for its own tables and the board's records
 
 _TIDY = """\
@@ -23,6 +24,10 @@ try: names = os.listdir({stage!r})
 except OSError: names = []
 for name in names:
     if name not in {keep!r}: os.remove({stage!r} + '/' + name)
+"""
+_DISARM = """\
+try: os.remove({path!r})
+except OSError: pass
 """
 _MOVE = """\
 import os
@@ -54,7 +59,7 @@ def install(port: str, files: Mapping[str, bytes], state: BoardState, say: Calla
         if state.free - SPARE_BYTES >= sum(_rounded(len(data), state.block) for data in missing.values()):
             copied = _staged(port, staged, missing, say)
         else:
-            copied = _in_place(port, wanted, say)
+            copied = _in_place(port, wanted, files, say)
         check(port, files)
     else:
         copied = ()
@@ -89,11 +94,16 @@ def _staged(
     return tuple(_place(PurePosixPath(path).name) for path in missing)
 
 
-def _in_place(port: str, wanted: Mapping[str, bytes], say: Callable[[str], None]) -> tuple[str, ...]:
-    """Where the file system has no room for both: a board interrupted meanwhile says that it is not complete."""
+def _in_place(
+    port: str, wanted: Mapping[str, bytes], files: Mapping[str, bytes], say: Callable[[str], None]
+) -> tuple[str, ...]:
+    """Where the file system has no room for both builds. The module that runs all others goes first and comes last:
+    interrupted meanwhile, the board says that it is not complete and does nothing."""
     say(f"copying {len(wanted)} files to {port}, one over the other: there is no room for both builds")
-    _copy(port, wanted, _TIDY.format(stage=STAGE, keep=[]))
-    return tuple(wanted)
+    order = [path for path in wanted if path not in (RUNS, MAIN)] + [path for path in (RUNS, MAIN) if path in files]
+    parts = {path: files[path] for path in order}
+    _copy(port, parts, _TIDY.format(stage=STAGE, keep=[]) + _DISARM.format(path=RUNS))
+    return tuple(order)
 
 
 def _copy(port: str, files: Mapping[str, bytes], first: str) -> None:
