@@ -60,7 +60,8 @@ def report(
         return
     for one in studies:
         notes(one.log.notes)
-        OUT.print(f"{one.log.path.name}: {one.verdict}")
+        named = ", ".join(s.effect for s in one.diagnosis.suspects) if one.diagnosis else ""
+        OUT.print(f"{one.log.path.name}: {one.verdict}{': ' + named if named else ''}", style="bold")
     OUT.print(f"page written to {output}")
 
 

@@ -12,6 +12,7 @@ from barberpole.numbers import plain
 from barberpole.summary import Summary
 from barberpole.verify import Verification
 
+COLOUR = {"adequate": "bold green", "missing": "bold red", "unexplained": "bold red"}  # the word says it too
 MANY = 12  # patterns shown to a person; --json has all
 
 
@@ -34,8 +35,8 @@ def fit_tables(fit: Fit, output: Path | None) -> None:
 
 def comparison(found: Comparison) -> None:
     """Residual by axis and the patterns in it."""
-    axes = ", ".join(f"{axis} {rms:.4g}" for axis, rms in found.rms_by_axis_lsb.items())
-    OUT.print(f"residual {found.rms_lsb:.4g} LSB rms ({axes}); noise {found.noise_lsb:.4g} LSB")
+    axes = ", ".join(f"{axis} {plain(rms)}" for axis, rms in found.rms_by_axis_lsb.items())
+    OUT.print(f"residual {plain(found.rms_lsb)} LSB rms ({axes}); noise {plain(found.noise_lsb)} LSB", style="bold")
     patterns(found.patterns)
 
 
@@ -45,25 +46,28 @@ def patterns(found: Sequence[Pattern]) -> None:
         OUT.print("the residual follows nothing that was logged")
         return
     shown = table("the residual follows", "axis", "against", "shape", "rms LSB", "p")
+    for column in shown.columns[1:3]:
+        column.justify = "left"
     for p in found[:MANY]:
-        shown.add_row(p.axis, p.against, p.shape, f"{p.rms_lsb:.3g}", f"{p.p_value:.1e}")
+        shown.add_row(p.axis, p.against, p.shape, plain(p.rms_lsb, 3), f"{p.p_value:.1e}")
     OUT.print(shown)
 
 
 def diagnosis(path: Path, found: Diagnosis) -> None:
     """Verdict first, then what it rests on."""
     OUT.print(
-        f"{path.name}: {found.verdict}  ({found.n} readings, residual {found.rms_lsb:.4g} LSB, "
-        f"noise {found.noise_lsb:.4g} LSB)",
-        style="bold",
+        f"{path.name}: {found.verdict}  ({found.n} readings, residual {plain(found.rms_lsb)} LSB, "
+        f"noise {plain(found.noise_lsb)} LSB)",
+        style=COLOUR.get(found.verdict, "bold"),
     )
     if found.suspects:
         shown = table("suspects", "effect", "held-out fall", "rms after LSB", "p", "cannot be told from")
+        shown.columns[-1].justify = "left"
         for s in found.suspects:
             shown.add_row(
                 s.effect,
                 f"{100 * s.heldout_drop:.1f} %",
-                f"{s.rms_after_lsb:.4g}",
+                plain(s.rms_after_lsb),
                 f"{s.p_value:.1e}",
                 ", ".join(s.confounded_with),
             )
@@ -90,7 +94,7 @@ def change(found: Change, model: Path | None) -> None:
 
 def verification(found: Verification) -> None:
     """Pass or fail, and each check in a sentence."""
-    OUT.print("pass" if found.passed else "FAIL", style="bold")
+    OUT.print("pass" if found.passed else "FAIL", style="bold green" if found.passed else "bold red")
     for check in found.checks:
         OUT.print(f"{'ok  ' if check.ok else 'FAIL'}  {check.sentence}")
 

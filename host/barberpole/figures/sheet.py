@@ -14,6 +14,7 @@ from barberpole.figures.theme import BEFORE, BLUE, DECADES, MODELLED, look
 from barberpole.numbers import plain, signed
 
 AT_C = 25.0
+STRAIGHT = 0.98  # of the linear residual: a polynomial that leaves more was not needed
 SMOOTH = 50  # points of a curve
 
 
@@ -41,6 +42,8 @@ def residual_fields(line: Linearity) -> Figure | None:
     figure.update_layout(showlegend=True, margin={"t": 60}, legend={"y": 1.1})
     linear, bent = (1000 * float(np.sqrt(np.mean(left**2))) for _, left, _, _ in kinds)
     title = f"A polynomial takes the residual from {plain(linear, 3)} to {plain(bent, 3)} nT rms"
+    if bent > STRAIGHT * linear:
+        title = f"The sensor is straight: a polynomial takes nothing off the {plain(linear, 3)} nT rms"
     said = "Residual of each axis against its own field after the linear (circles) and the polynomial calibration."
     return Figure(figure, title, said)
 
@@ -73,9 +76,9 @@ def response(got: Response) -> Figure:
     )
     level(figure, HALF_POWER)
     figure.add_annotation(text="half power", x=0, xref="x domain", xanchor="left", y=HALF_POWER, yanchor="bottom")
-    last = f"{plain(100 * float(got.relative[-1]), 3)} % at {plain(float(got.frequency_hz[-1]), 3)} Hz"
+    last = f"at {plain(float(got.frequency_hz[-1]), 3)} Hz is {plain(100 * float(got.relative[-1]), 3)} %"
     said = "From the histograms of a sine (article eq. 8-9); error bars: the scatter of the axes."
-    return Figure(figure, f"The amplitude is down to {last}", said)
+    return Figure(figure, f"The amplitude {last} of that at the lowest frequency", said)
 
 
 def over_temperature(name: str, courses: Sequence[tuple[str, Course]], unit: str) -> Figure:
