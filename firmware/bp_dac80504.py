@@ -16,6 +16,7 @@ _GAIN_2 = const(0x000F)  # every output twice the reference
 
 class Dac80504:
     def __init__(self, spi, cs):
+        self.zero = 32768
         self._spi = spi
         self._cs = cs
         self._out = bytearray(3)

@@ -78,7 +78,7 @@ def power_up(hardware, writer, clock):  # what was said of it, header and verdic
 
 def self_test(hardware):  # codes of what forbids a self-calibration, whether samples can be had, and a detail
     try:
-        hardware.adc.start(board.ADC_RATIO_CODE, board.ADC_GAIN1, board.ADC_GAIN2)
+        hardware.start()
         hardware.sampler.clear()
         hardware.sampler.cycle()
         hardware.sampler.check()

@@ -2,7 +2,7 @@
 #
 # TIM8 counts up and down (centre-aligned). One channel is active around CNT = 0: the SET pulse; one around CNT = ARR:
 # the RESET pulse, half a cycle later. With the compare value c both last 2 c ticks and are ARR - 2 c ticks apart,
-# whatever the rate is: they never overlap. Each turning point is an update, which goes out as TRGO and sets TIM2 to zero;
+# whatever the rate is: they never overlap. Each turning point is an update, goes out as TRGO and sets TIM2 to zero;
 # TIM2 beats n times in each half cycle, and each beat (its CC2) starts a scan of the converter (bp_scan). So the number
 # of a scan since the start is its phase in the flip cycle.
 #

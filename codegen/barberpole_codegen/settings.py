@@ -11,6 +11,7 @@ from barberpole.fitted import from_calibration
 from barberpole.selfcal import slope_lsb_per_ut
 from barberpole.trajectory import CodeTable
 
+from barberpole_codegen import parts
 from barberpole_codegen.emit import Constant, literal
 from barberpole_codegen.functions import RowScales
 from barberpole_codegen.narrow import narrow_number
@@ -20,13 +21,7 @@ WIDE_DRIFT = 0.5  # without a factory reference gains are compared with nominal 
 RESIDUALS = 3.0  # a coil run may be this much worse than the calibration was when it was fitted
 EARTH_UT = 50.0  # a typical ambient field, on top of which the coils are driven
 CURVATURE = 3  # the lowest odd power a bridge's law can miss
-FIRST_RATIO = 128  # oversampling ratio of code 0; each code doubles it
-MODULATOR_HZ = 4096000  # of the ADS131M08 at 8.192 MHz
 OWN_OFFSET = ("bias.bridge_", "flip_asymmetry.offset_")  # parameters that are the electronic offset
-LAST_RATIO_CODE = 6  # the next is 16256, not a power of two
-LARGEST_GAIN = 128
-FRAME_BITS = 240  # status, eight channels and check sum of 24 bits
-MOST_SUMMED = 255
 CONVERSIONS = 2  # of a channel other than the bridges' in a cycle: one after SET, one after RESET
 T0_C = 25.0  # at which the sensor file gives the bridge resistance
 
@@ -141,6 +136,7 @@ def _flip(board: Board) -> list[Constant]:
         Constant("PULSE_US", round(flip.pulse_us)),
         Constant("SETTLE_US", round(flip.settle_us), "from a pulse to the first sample"),
         Constant("HALF_US", round(0.5e6 / flip.rate_hz), "half a flip cycle"),
+        *parts.timed(board),
     ]
 
 
@@ -148,9 +144,6 @@ def _adc(board: Board) -> list[Constant]:
     adc, scales = board.adc, row_scales(board)
     c = adc.channels
     channels = (c.x, c.y, c.z, c.bridge, c.coil_x, c.coil_y, c.coil_z, c.supply)
-    gain1, gain2 = _gain_registers(adc.pga, channels[:3])
-    ratio = _ratio_code(adc.sample_hz)
-    _require_frame_time(adc.baud, adc.sample_hz)
     per_lsb = {
         "TEMP_AT_0_C": (scales.zero_c, "bridge temperature for a code of 0"),
         "TEMP_C_PER_LSB": (scales.c_per_lsb, "the bridge's resistance at a constant current is the thermometer"),
@@ -160,14 +153,13 @@ def _adc(board: Board) -> list[Constant]:
         "LSB_PER_V": (_lsb_per_v(board) * adc.pga, "at the bridge"),
     }
     return [
+        Constant("ADC_PART", adc.part),
         Constant("ADC_SPI", adc.spi),
         Constant("ADC_BAUD", adc.baud),
         Constant("ADC_CS_PIN", adc.cs_pin),
         Constant("ADC_DRDY_PIN", adc.drdy_pin),
         Constant("ADC_RESET_PIN", adc.reset_pin),
-        Constant("ADC_RATIO_CODE", ratio, f"{adc.sample_hz:g} conversions a second"),
-        Constant("ADC_GAIN1", gain1, "channels 0 to 3"),
-        Constant("ADC_GAIN2", gain2, "channels 4 to 7"),
+        *parts.adc_registers(board),
         Constant("ADC_CHANNELS", channels, "x y z bridge coil_x coil_y coil_z supply"),
         Constant("SAMPLES_PER_HALF", adc.samples_per_half),
         *(Constant(name, narrowed((value,))[0], comment) for name, (value, comment) in per_lsb.items()),
@@ -193,35 +185,10 @@ def _lsb_per_v(board: Board) -> float:
     return float(1 << (board.adc.bits - 1)) / board.adc.vref_v
 
 
-def _gain_registers(pga: int, bridges: tuple[int, ...]) -> tuple[int, int]:
-    """GAIN1 and GAIN2: four channels each, four bits a channel, the code is log2 of the gain; gain 1 elsewhere."""
-    code = pga.bit_length() - 1
-    if pga != 1 << code or pga > LARGEST_GAIN:
-        raise LimitError(must("adc.pga", f"a power of two up to {LARGEST_GAIN}, as the ads131m08 has them", pga))
-    both = sum(code << (4 * channel) for channel in bridges)
-    return both & 0xFFFF, both >> 16
-
-
-def _ratio_code(sample_hz: float) -> int:
-    """CLOCK.OSR: the power of two by which the oversampling ratio exceeds the smallest."""
-    ratio = MODULATOR_HZ / FIRST_RATIO / sample_hz
-    code = round(math.log2(ratio))
-    if ratio != 2.0**code or not 0 <= code <= LAST_RATIO_CODE:
-        rates = ", ".join(f"{MODULATOR_HZ / FIRST_RATIO / 2**k:g}" for k in range(LAST_RATIO_CODE + 1))
-        raise LimitError(must("adc.sample_hz", f"a rate of the ads131m08 ({rates})", f"{sample_hz:g}"))
-    return code
-
-
-def _require_frame_time(baud: int, sample_hz: float) -> None:
-    """A frame must be read before the next conversion, or conversions are lost."""
-    needed = FRAME_BITS * sample_hz
-    if baud < needed:
-        raise LimitError(must("adc.baud", f"at least {needed:g} bit/s ({FRAME_BITS} bits a conversion)", f"{baud}"))
-
-
 def _dac(board: Board) -> list[Constant]:
     dac = board.dac
     return [
+        *parts.dac_output(board),
         Constant("DAC_SPI", dac.spi),
         Constant("DAC_BAUD", dac.baud),
         Constant("DAC_CS_PIN", dac.cs_pin),
@@ -234,9 +201,11 @@ def _dac(board: Board) -> list[Constant]:
 def _selfcal(board: Board) -> list[Constant]:
     run = board.selfcal
     summed = run.cycles_per_point * board.adc.samples_per_half
-    if summed > MOST_SUMMED:
+    most = (1 << 32 - board.adc.bits) - 1
+    if summed > most:
         what = "selfcal.cycles_per_point times adc.samples_per_half"
-        raise LimitError(must(what, f"at most {MOST_SUMMED} (sums of 24-bit codes are kept in 32 bits)", summed))
+        why = f"sums of {board.adc.bits}-bit codes are kept in 32 bits"
+        raise LimitError(must(what, f"at most {most} ({why})", summed))
     return [
         Constant("SETTLE_CYCLES", run.settle_cycles, "dropped after each new current"),
         Constant("CYCLES_PER_POINT", run.cycles_per_point),

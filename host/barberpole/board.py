@@ -14,13 +14,20 @@ from barberpole.errors import InputError, must
 from barberpole.sensor import Sensor
 from barberpole.tables import closest, read_toml, unknown, validate
 
-__all__ = ["Board", "Sensor", "load_board", "load_sensor"]
+__all__ = ["Board", "Sensor", "load_board", "load_sensor", "read_board"]
 
 TABLES = ("flip", "adc", "dac", "coils", "selfcal", "timing")
 
 
 def load_board(name_or_path: str | Path) -> Board:
     """A board by name ("pybv11") or path, with its sensor. Raises InputError or LimitError."""
+    board = read_board(name_or_path)
+    check_board(board, _find(name_or_path, paths.boards(), "board"))
+    return board
+
+
+def read_board(name_or_path: str | Path) -> Board:
+    """A board that is well-formed, whatever it asks of its parts. Raises InputError."""
     path = _find(name_or_path, paths.boards(), "board")
     tables = read_toml(path, "the board file")
     head = tables.pop("board", None)
@@ -31,9 +38,7 @@ def load_board(name_or_path: str | Path) -> Board:
     if not isinstance(sensor, str):
         raise InputError(must("board.sensor", "the name of a sensor file", repr(sensor), path))
     content = {**head, **tables, "sensor": load_sensor(_beside(path, sensor))}
-    board = validate(Board, content, "the board file", path, "board.")
-    check_board(board, path)
-    return board
+    return validate(Board, content, "the board file", path, "board.")
 
 
 def load_sensor(name_or_path: str | Path) -> Sensor:

@@ -5,13 +5,26 @@ Each check raises LimitError (InputError for pins and channels) with the figures
 
 from collections.abc import Callable, Mapping
 
+from barberpole import wiring
 from barberpole.board_tables import Board
-from barberpole.errors import InputError, LimitError, must
+from barberpole.errors import BarberpoleError, InputError, LimitError, must
+from barberpole.mcu import load_pinout
+from barberpole.strap import strap_decay, strap_ohm, strap_peak_a, strap_power_mw
 
 FULL_SCALE_TOLERANCE = 0.01  # resistors of one per cent
 HOT_C = 85.0  # the bridge voltage is largest there
 T0_C = 25.0
-CHANNELS = {"ads131m08": 8, "dac80504": 4}
+CHANNELS = {"ads131m08": 8, "ads8688": 8, "stm32f4_adc": 16, "dac80504": 4, "stm32f4_dac": 3}
+BITS = {"ads131m08": 24, "ads8688": 16, "stm32f4_adc": 12, "dac80504": 16, "stm32f4_dac": 12}
+SPANS_V = {"ads8688": (2.56, 5.12, 10.24)}
+"""Full scales at gain 1, where a part offers a few (SBAS582, 8.3.2: 0.625, 1.25 and 2.5 times 4.096 V)."""
+M08_LOWEST_V, M08_HIGHEST_V, M08_HEADROOM_V = -1.3, 3.3, 1.8
+"""Absolute inputs of the ADS131M08 (SBAS950B, 6.3): -1.3 V to AVDD, at gains of 8 and more to AVDD - 1.8 V."""
+RING_CYCLES = 20
+"""Fewest: 12 ms of the collector and as much of USB at 1 kHz."""
+RING_HALFWORDS = 65535
+SCAN_INPUTS, SCAN_CLOCKS, ADC_DIVIDER = 8, 40, 4
+"""A scan of the on-chip converter: inputs, clocks of one (28 sampling, 12 converting); its clock is PCLK2 / 4."""
 
 
 def check_board(board: Board, where: object = "") -> None:
@@ -20,27 +33,68 @@ def check_board(board: Board, where: object = "") -> None:
         check(board, where)
 
 
-def strap_power_mw(board: Board) -> float:
-    """Power of flipping in mW: C V² f (thesis 3.4.3)."""
-    flip = board.flip
-    return flip.capacitor_nf * 1e-9 * flip.strap_supply_v**2 * flip.rate_hz * 1e3
+def faults(board: Board) -> list[str]:
+    """Everything that is wrong, each as one sentence; a check that finds nothing to look at stays silent."""
+    found = wiring.conflicts(board)
+    for check in CHECKS[1:]:
+        try:
+            check(board, "")
+        except BarberpoleError as error:
+            found.append(str(error))
+    return found
 
 
-def strap_peak_a(board: Board) -> float:
-    """Peak of the pulse in A: the three straps in series across the supply."""
-    return board.flip.strap_supply_v / (3.0 * board.sensor.strap_ohm)
+def scan_us(board: Board) -> float:
+    """µs of one scan of the on-chip converter."""
+    return SCAN_INPUTS * SCAN_CLOCKS * ADC_DIVIDER / (board.cpu_mhz / 2.0)
 
 
-def _pins(board: Board, where: object) -> None:
-    pins = {
-        "flip.set_pin": board.flip.set_pin,
-        "flip.reset_pin": board.flip.reset_pin,
-        "adc.cs_pin": board.adc.cs_pin,
-        "adc.drdy_pin": board.adc.drdy_pin,
-        "adc.reset_pin": board.adc.reset_pin,
-        "dac.cs_pin": board.dac.cs_pin,
-    }
-    _distinct(pins, "pin", where)
+def scans_per_half(board: Board) -> int:
+    """Scans of the on-chip converter in half a flip cycle."""
+    return round(board.adc.sample_hz / (2.0 * board.flip.rate_hz))
+
+
+def _wiring(board: Board, where: object) -> None:
+    for conflict in wiring.conflicts(board):
+        raise InputError(f"{conflict} ({where})" if where else conflict)
+
+
+def _bits(board: Board, where: object) -> None:
+    for table, part, bits in (("adc", board.adc.part, board.adc.bits), ("dac", board.dac.part, board.dac.bits)):
+        if bits != BITS[part]:
+            raise InputError(must(f"{table}.bits", f"{BITS[part]}, those of the {part}", bits, where))
+    spans = SPANS_V.get(board.adc.part)
+    if spans and board.adc.vref_v not in spans:
+        known = ", ".join(f"{v:g}" for v in spans)
+        raise LimitError(
+            must("adc.vref_v", f"a full scale of the {board.adc.part} ({known} V)", board.adc.vref_v, where)
+        )
+
+
+def _common_mode(board: Board, where: object) -> None:
+    """The converter sees each end of a bridge against its own ground, not only their difference."""
+    if board.adc.part != "ads131m08":
+        return  # amplifiers stand before the others
+    swing_v = 0.5 * board.adc.vref_v / board.adc.pga
+    highest_v = M08_HIGHEST_V - (M08_HEADROOM_V if board.adc.pga >= 8 else 0.0)
+    what, reason = "adc.common_mode_v with half the signal", f"absolute input range at adc.pga {board.adc.pga}"
+    feed = f"{reason}; feed the bridges symmetrically about ground"
+    _at_most(what, board.adc.common_mode_v + swing_v, highest_v, "V", feed, where)
+    _at_least(what, board.adc.common_mode_v - swing_v, M08_LOWEST_V, "V", reason, where)
+
+
+def _ring(board: Board, where: object) -> None:
+    """Scans must end before the next begins, and enough cycles must fit into one transfer of DMA."""
+    if board.flip.timing != "hardware":
+        return
+    limit = load_pinout(board.micropython_board).mcu.adc_clock_max_mhz
+    _at_most("the converter's clock", board.cpu_mhz / 2.0 / ADC_DIVIDER, limit, "MHz", "PCLK2 / 4", where)
+    reason = f"a scan of {SCAN_INPUTS} inputs takes {scan_us(board):.1f} µs and has to leave a tenth"
+    _at_most("adc.sample_hz", board.adc.sample_hz, 0.9e6 / scan_us(board), "Hz", reason, where)
+    _at_least("adc.ring_cycles", board.adc.ring_cycles, RING_CYCLES, "", "pauses of collector and USB", where)
+    halfwords = 2 * scans_per_half(board) * SCAN_INPUTS * board.adc.ring_cycles
+    _at_most("the ring", halfwords, RING_HALFWORDS, "codes", "one transfer of DMA", where)
+    _at_most("the ring", 2 * halfwords, 256 * board.ram_kib, "bytes", "a quarter of board.ram_kib", where)
 
 
 def _channels(board: Board, where: object) -> None:
@@ -69,8 +123,12 @@ def _pulse(board: Board, where: object) -> None:
 
 def _strap_current(board: Board, where: object) -> None:
     peak, needed = strap_peak_a(board), board.sensor.strap_current_a
-    straps = f"three straps of {board.sensor.strap_ohm:g} Ω in series need it"
-    _at_least(f"the pulse of {board.flip.strap_supply_v:g} V", peak, needed, "A", straps, where)
+    flip = board.flip
+    straps = (
+        f"three straps of {board.sensor.strap_ohm:g} Ω in series need it; {strap_decay(board):.0%} of a pulse's "
+        f"current is left after {flip.pulse_us:g} µs through {flip.capacitor_nf:g} nF and {strap_ohm(board):.3g} Ω"
+    )
+    _at_least(f"the pulse of {flip.strap_supply_v:g} V", peak, needed, "A", straps, where)
 
 
 def _strap_power(board: Board, where: object) -> None:
@@ -139,25 +197,34 @@ def _coil_settling(board: Board, where: object) -> None:
     if board.selfcal.settle_cycles == 0:
         reason = "flip.settle_us, since selfcal.settle_cycles is 0"
         _at_most("coils.settle_us", board.coils.settle_us, board.flip.settle_us, "µs", reason, where)
+    else:
+        settled_us = board.selfcal.settle_cycles * 1e6 / board.flip.rate_hz
+        reason = f"selfcal.settle_cycles of {board.flip.rate_hz:g} Hz"
+        _at_most("coils.settle_us", board.coils.settle_us, settled_us, "µs", reason, where)
 
 
 def _at_most(what: str, value: float, limit: float, unit: str, reason: str, where: object) -> None:
     if value > limit * (1 + 1e-9):  # rounding is no fault
-        raise LimitError(must(what, f"at most {limit:.4g} {unit} ({reason})", f"{value:.4g} {unit}", where))
+        unit = f" {unit}" if unit else ""
+        raise LimitError(must(what, f"at most {limit:.4g}{unit} ({reason})", f"{value:.4g}{unit}", where))
 
 
 def _at_least(what: str, value: float, limit: float, unit: str, reason: str, where: object) -> None:
-    if value < limit * (1 - 1e-9):
-        raise LimitError(must(what, f"at least {limit:.4g} {unit} ({reason})", f"{value:.4g} {unit}", where))
+    if value < limit - 1e-9 * abs(limit):
+        unit = f" {unit}" if unit else ""
+        raise LimitError(must(what, f"at least {limit:.4g}{unit} ({reason})", f"{value:.4g}{unit}", where))
 
 
 CHECKS: tuple[Callable[[Board, object], None], ...] = (
-    _pins,
+    _wiring,
     _channels,
+    _bits,
     _pulse,
     _strap_current,
     _strap_power,
     _half_cycle,
+    _ring,
+    _common_mode,
     _adc_range,
     _divided_voltages,
     _dac_range,

@@ -9,7 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from barberpole.sensor import PerAxis, Sensor
-from barberpole.tables import STRICT, Count, Fraction, Index, Integer, NotNegative, Positive, Yes
+from barberpole.tables import STRICT, Count, Fraction, Index, Integer, NotNegative, Number, Positive, Yes
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -30,6 +30,14 @@ class Flip:
     """V. Supply of the strap driver."""
     capacitor_nf: Positive
     """nF. Capacitor in series with the three straps."""
+    driver_ohm: NotNegative = 0.0
+    """Ω. On-resistance of the driver and its wiring, in series with the straps."""
+    timing: Literal["software", "hardware"] = "software"
+    """Who times pulses and samples: the program, with a converter on SPI; or two timers, with the on-chip converter."""
+    break_pin: str = ""
+    """Pin of the kill loop (TIM8_BKIN): a wire to ground that stops the pulses when it opens. Empty: none."""
+    dead_time_us: NotNegative = 1.0
+    """µs. Least time between the end of a pulse and the beginning of the opposite one; with timing = "hardware"."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -58,18 +66,8 @@ class AdcChannels:
 class Adc:
     """The converter of bridges, coil currents and supplies."""
 
-    part: Literal["ads131m08"]
-    """Part, which names the firmware's driver."""
-    spi: Count
-    """Number of the SPI bus."""
-    cs_pin: str
-    """Chip-select pin."""
-    drdy_pin: str
-    """Data-ready pin, low when a conversion waits."""
-    reset_pin: str
-    """Reset pin, active low."""
-    baud: Count
-    """bit/s. Clock of the SPI bus."""
+    part: Literal["ads131m08", "ads8688", "stm32f4_adc"]
+    """Part, which names the firmware's driver; stm32f4_adc is the microcontroller's own."""
     sample_hz: Positive
     """Hz. Conversions a second, all channels at once."""
     samples_per_half: Count
@@ -77,7 +75,7 @@ class Adc:
     vref_v: Positive
     """V. Full scale at gain 1, both signs."""
     pga: Count
-    """Gain of the bridge channels; the others run at 1."""
+    """Gain of the bridge channels, in the converter or in amplifiers before it; the others run at 1."""
     bits: Count
     """Bits of one conversion."""
     bridge_divider: Fraction
@@ -87,7 +85,27 @@ class Adc:
     coil_shunt_ohm: Positive
     """Ω. Shunt in series with each coil."""
     channels: AdcChannels
-    """Inputs."""
+    """Inputs; of ADC1 where the converter is the microcontroller's own."""
+    spi: Index = 0
+    """Number of the SPI bus; none for the on-chip converter."""
+    cs_pin: str = ""
+    """Chip-select pin, of a converter on SPI."""
+    drdy_pin: str = ""
+    """Data-ready pin, low when a conversion waits; of the ads131m08."""
+    reset_pin: str = ""
+    """Reset pin, active low; of the ads131m08."""
+    baud: Index = 0
+    """bit/s. Clock of the SPI bus."""
+    sck_pin: str = ""
+    """Clock pin of the bus, to be checked; MicroPython's own where empty."""
+    miso_pin: str = ""
+    """Data pin from the converter, to be checked."""
+    mosi_pin: str = ""
+    """Data pin to the converter, to be checked."""
+    common_mode_v: Number = 0.0
+    """V. Mean of the two outputs of a bridge against the converter's ground: 0 with a symmetric bridge feed."""
+    ring_cycles: Index = 0
+    """Flip cycles that the ring of samples holds; a pause of the program up to this long loses nothing."""
 
     @property
     def lsb_per_mv(self) -> float:
@@ -111,14 +129,8 @@ class DacChannels:
 class Dac:
     """The converter that drives the offset coils, around its mid scale."""
 
-    part: Literal["dac80504"]
-    """Part, which names the firmware's driver."""
-    spi: Count
-    """Number of the SPI bus."""
-    cs_pin: str
-    """Chip-select pin."""
-    baud: Count
-    """bit/s. Clock of the SPI bus."""
+    part: Literal["dac80504", "stm32f4_dac"]
+    """Part, which names the firmware's driver; stm32f4_dac is the microcontroller's own."""
     bits: Count
     """Bits of one code."""
     vref_v: Positive
@@ -126,7 +138,21 @@ class Dac:
     gain: Literal[1, 2]
     """Output gain: full scale is vref_v × gain."""
     channels: DacChannels
-    """Outputs."""
+    """Outputs; of the stm32f4_dac 0 and 1 are the converter's (PA4, PA5), 2 is dac.pwm_pin."""
+    spi: Index = 0
+    """Number of the SPI bus; none for the on-chip converter."""
+    cs_pin: str = ""
+    """Chip-select pin, of a converter on SPI."""
+    baud: Index = 0
+    """bit/s. Clock of the SPI bus."""
+    sck_pin: str = ""
+    """Clock pin of the bus, to be checked; MicroPython's own where empty."""
+    miso_pin: str = ""
+    """Data pin from the converter, to be checked."""
+    mosi_pin: str = ""
+    """Data pin to the converter, to be checked."""
+    pwm_pin: str = ""
+    """Timer output that, through a low-pass filter, is the third output of the stm32f4_dac."""
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -12,6 +12,7 @@ import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, 
 from barberpole import __version__
 from barberpole.commands import (
     board,
+    board_check,
     calibrate,
     catalogue,
     challenge,
@@ -43,6 +44,7 @@ catalogue.register(app)
 methods.register(app)
 characterise.register(app)
 board.register(app)
+board_check.register(app)
 trajectory.register(app)
 design.register(app)
 challenge.register(app)

@@ -2,13 +2,15 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from barberpole import paths
 from barberpole.board import load_board, load_sensor
-from barberpole.board_checks import strap_peak_a, strap_power_mw
 from barberpole.errors import BarberpoleError, InputError, LimitError
+from barberpole.strap import strap_decay, strap_mean_a, strap_ohm, strap_peak_a, strap_power_mw
+from barberpole.wiring import conflicts
 
 TEXT = (paths.boards() / "pybv11.toml").read_text()
 
@@ -82,9 +84,27 @@ def test_noise_density_is_thermal_noise_and_an_amplifier():
 
 def test_strap_power_is_the_thesis_at_one_kilohertz():
     board = load_board("pybv11")
-    at_1_khz = strap_power_mw(board) * 1000.0 / board.flip.rate_hz
-    assert at_1_khz == pytest.approx(32.0, rel=0.02)  # thesis 3.4.3
+    thesis = replace(board, flip=replace(board.flip, strap_supply_v=12.0, capacitor_nf=220.0, rate_hz=1000.0))
+    assert strap_power_mw(thesis) == pytest.approx(32.0, rel=0.02)  # thesis 3.4.3
     assert strap_peak_a(board) >= board.sensor.strap_current_a
+
+
+def test_strap_current_two_ways():
+    """The capacitor charged to and fro until nothing changes, against the closed forms."""
+    board = load_board("pybv11")
+    ohm, farad = strap_ohm(board), board.flip.capacitor_nf * 1e-9
+    volt, step = 0.0, 1e-9
+    for half in range(20):
+        target, coulomb = board.flip.strap_supply_v * (half % 2), 0.0
+        peak = (target - volt) / ohm
+        for _ in range(round(board.flip.pulse_us * 1e-6 / step)):
+            current = (target - volt) / ohm
+            coulomb += current * step
+            volt += current * step / farad
+    assert abs(peak) == pytest.approx(strap_peak_a(board), rel=1e-3)
+    assert current / peak == pytest.approx(strap_decay(board), rel=2e-3)
+    assert abs(coulomb) / (board.flip.pulse_us * 1e-6) == pytest.approx(strap_mean_a(board), rel=1e-3)
+    assert 0.95 * abs(peak) > board.sensor.strap_current_a  # at the lowest supply that the firmware accepts
 
 
 def test_scale_from_the_parts():
@@ -120,10 +140,20 @@ def test_power_up_run_fits_into_two_seconds():
         ("board.shielded", "shielded = 0", "board.shielded"),
         ("board.sensor", "", "board.sensor"),
         ("board.sensor", 'sensor = "nowhere.toml"', "the sensor file must be a file that can be read"),
-        ("dac.cs_pin", 'cs_pin = "Y1"', "Y1, which is also flip.set_pin"),
+        ("dac.cs_pin", 'cs_pin = "Y1"', "Y1 = PC6, which is also flip.set_pin"),
         ("adc.channels.supply", "supply = 6", "6, which is also adc.channels.coil_z"),
         ("adc.channels.supply", "supply = 8", "at most 7 on the ads131m08"),
-        ("flip.rate_hz", "rate_hz = = 200", "valid TOML; got Invalid value (at line 20"),
+        ("adc.bits", "bits = 16", "24, those of the ads131m08"),
+        ("adc.spi", "spi = 9", "one of the buses of a PYBV11 (1, 2)"),
+        ("dac.cs_pin", 'cs_pin = "Q99"', "dac.cs_pin must be a pin of the PYBV11; got 'Q99'"),
+        ("adc.sck_pin", 'sck_pin = "Y6"', "X6 (PA5), which is sck of SPI 1; got Y6, which is SPI2_SCK"),
+        ("adc.cs_pin", 'cs_pin = "X8"', "X8 = PA7, which is also adc.cs_pin"),
+        ("adc.cs_pin", 'cs_pin = "X17"', "X17 = PB3, which is the user switch"),
+        ("adc.drdy_pin", "", "adc.drdy_pin must be given for the ads131m08"),
+        ("flip.timing", 'timing = "hardware"', '"software" with a converter on SPI'),
+        ("board.mcu", 'mcu = "STM32F446RE"', "the STM32F405 of a PYBV11"),
+        ("board.micropython_board", 'micropython_board = "PYBV9"', "one of NUCLEO_F446RE, PYBV11, STM32F4DISC"),
+        ("flip.rate_hz", "rate_hz = = 200", "valid TOML; got Invalid value (at line 22"),
     ],
 )
 def test_wrong_file_is_refused(tmp_path, key, line, says):
@@ -140,7 +170,10 @@ def test_wrong_file_is_refused(tmp_path, key, line, says):
         ("flip.rate_hz", "rate_hz = 400", "half cycle's work must be at most 1250 µs"),
         ("flip.settle_us", "settle_us = 2000", "half cycle"),
         ("flip.strap_supply_v", "strap_supply_v = 9.0", "at least 0.5 A"),
-        ("flip.capacitor_nf", "capacitor_nf = 4700.0", "power of flipping"),
+        ("flip.strap_supply_v", "strap_supply_v = 12.0", "got 0.407"),
+        ("flip.strap_supply_v", "strap_supply_v = 50.0", "power of flipping"),
+        ("flip.capacitor_nf", "capacitor_nf = 4700.0", "93% of a pulse's current is left"),
+        ("adc.common_mode_v", "common_mode_v = 2.75", "feed the bridges symmetrically"),
         ("coils.max_ma", "max_ma = 3.0", "coils.max_ma; a radius of 80 µT takes it"),
         ("coils.max_ma", "max_ma = 5.5", "the DAC reaches no further"),
         ("coils.max_ma", "max_ma = 25.0", "the offset coil bears no more"),
@@ -158,6 +191,40 @@ def test_limit_is_refused(tmp_path, key, line, says):
     assert isinstance(error, LimitError)
     assert says in str(error)
     assert str(tmp_path) in str(error)
+
+
+TIMED = (paths.boards() / "pybv11_timed.toml").read_text()
+NUCLEO = (paths.boards() / "nucleo_f446re.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "line", "says"),
+    [
+        (TIMED, "flip.set_pin", 'set_pin = "X10"', "a channel of TIM8 (C8, C9, Y1, Y2)"),
+        (TIMED, "flip.break_pin", 'break_pin = "X8"', "the break input of TIM8 (X7)"),
+        (TIMED, "flip.timing", 'timing = "software"', '"hardware" with the stm32f4_adc'),
+        (TIMED, "dac.pwm_pin", 'pwm_pin = "Y9"', "an output of a timer other than TIM8, TIM2, TIM5, TIM6"),
+        (TIMED, "adc.ring_cycles", "ring_cycles = 8", "adc.ring_cycles must be at least 20"),
+        (TIMED, "adc.ring_cycles", "ring_cycles = 200", "a quarter of board.ram_kib"),
+        (TIMED, "adc.sample_hz", "sample_hz = 64000", "a scan of 8 inputs takes 15.2 µs"),
+        (TIMED, "board.cpu_mhz", "cpu_mhz = 320", "at most 36 MHz"),
+        (TIMED, "adc.channels.x", "x = 4", "X5 = PA4, which is also adc.channels.x (ADC1 input 4)"),
+        (TIMED, "adc.channels.x", "x = 16", "an input of ADC1 that has a pin"),
+        (TIMED, "coils.settle_us", "settle_us = 6000", "selfcal.settle_cycles of 1000 Hz"),
+        (NUCLEO, "dac.cs_pin", 'cs_pin = "D1"', "the prompt's serial line to the ST-LINK"),
+    ],
+)
+def test_what_timed_boards_cannot_do_is_refused(tmp_path, text, key, line, says):
+    text = re.sub(r"^(sck|miso|mosi)_pin.*\n", "", text, flags=re.M)
+    assert says in str(refuse(tmp_path, edited(key, line, text)))
+
+
+def test_a_bus_on_the_controller_of_the_samples_is_refused():
+    board = load_board("nucleo_f446re")
+    found = conflicts(replace(board, dac=replace(board.dac, spi=1)))
+    assert any("MicroPython stops DMA2 64 ms after its own last use" in text for text in found)
+    assert any("the green LED" in text for text in found)
+    assert conflicts(board) == []
 
 
 def test_slow_coils_need_settle_cycles(tmp_path):

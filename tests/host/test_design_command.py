@@ -60,7 +60,7 @@ def test_noise(answer):
 
 def test_flip(answer):
     found = answer("flip", "pybv11")
-    assert found["power_mw"] == pytest.approx(220e-9 * 144 * 200 * 1e3)
+    assert found["power_mw"] == pytest.approx(220e-9 * 16**2 * 200 * 1e3)
     assert found["decided_by"] == "noise"
     assert found["chosen_noise_factor"] <= found["noise_factor"]
     assert answer("flip", "pybv11", "--full-bridge")["power_mw"] == pytest.approx(4 * found["power_mw"])

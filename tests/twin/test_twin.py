@@ -187,7 +187,7 @@ def test_faults_reach_the_program(start, said):
     twin = start("readings.py", faults=("supply_low",))
     rows = readings(said(twin, END))
     assert np.allclose(rows[0, :3], rows[1, :3], atol=200.0)  # noise only: nothing flips
-    assert rows[0, 7] * 1.2 / 2**23 / 0.05 == pytest.approx(7.2, rel=1e-3)
+    assert rows[0, 7] * 1.2 / 2**23 / 0.05 == pytest.approx(9.6, rel=1e-3)
     assert twin.truth()["faults"] == ["supply_low"]
     twin.power_cycle(faults=())
     rows = readings(said(twin, END, count=2))

@@ -13,6 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from barberpole.board import Board
+from barberpole.strap import strap_peak_a
 from barberpole.twin.ambient import Stepped
 from barberpole.twin.physics import film_field, turns_over
 from barberpole.twin.world import IDENTITY, T0_C, World
@@ -67,8 +68,8 @@ class SensorHead:
 
     @property
     def strap_a(self) -> float:
-        """Peak of a strap pulse in A: the three straps in series across the supply."""
-        return self.supply_v / (3.0 * self.board.sensor.strap_ohm)
+        """Peak of a strap pulse in A, through the capacitor that the last one has left charged."""
+        return strap_peak_a(self.board) * self.supply_v / self.board.flip.strap_supply_v
 
     def volts(self, t_s: float) -> list[float]:
         """Voltage on every input of the converter at t_s, without noise."""

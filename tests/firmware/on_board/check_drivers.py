@@ -3,6 +3,7 @@ import micropython
 
 import bp_reasons as reasons
 from bp_ads131m08 import FRAME_BYTES, Ads131m08
+from bp_ads8688 import Ads8688
 from bp_coils import Coils
 from bp_dac80504 import Dac80504
 from bp_flip import Flip
@@ -100,6 +101,62 @@ def check_dac_write_allocates_nothing():
         dac.write(1, 40000)
     finally:
         micropython.heap_unlock()
+
+
+class Ads8688Chip:  # registers and channel sequence of an ADS8688 (SBAS582): codes(channel) gives the straight binary
+    def __init__(self, codes):
+        self.registers = {}
+        self._codes = codes
+        self._next = None
+
+    def write_readinto(self, out, into):
+        assert len(out) == len(into) == 4
+        result = 0 if self._next is None else self._codes(self._next)
+        into[0] = into[1] = 0
+        into[2], into[3] = result >> 8, result & 255
+        if out[0] == 0xA0:
+            self._next = 0
+        elif out[0] == 0:
+            self._next = None if self._next is None else (self._next + 1) % 8
+        elif out[0] < 0x80 and out[0] & 1:
+            self.registers[out[0] >> 1] = out[1]
+        elif out[0] < 0x80:
+            into[2] = self.registers.get(out[0] >> 1, 0)
+
+
+def check_ads8688_starts_and_reads_signed_words():
+    chip = Ads8688Chip(lambda channel: (0x0000, 0x7FFF, 0x8000, 0x8001, 0xFFFF, 0x1234, 0x8000, 0xC000)[channel])
+    adc = Ads8688(chip, Pin(1))
+    adc.start(2)
+    assert chip.registers == {1: 0xFF, 5: 2, 6: 2, 7: 2, 8: 2, 9: 2, 10: 2, 11: 2, 12: 2}
+    frame = bytearray(FRAME_BYTES)
+    micropython.heap_lock()
+    try:
+        adc.read_into(frame)
+        adc.read_into(frame)
+    finally:
+        micropython.heap_unlock()
+    words = [frame[3 + 3 * i] << 16 | frame[4 + 3 * i] << 8 | frame[5 + 3 * i] for i in range(8)]
+    signed = [word - 0x1000000 if word & 0x800000 else word for word in words]
+    assert signed == [-0x8000, -1, 0, 1, 0x7FFF, 0x1234 - 0x8000, 0, 0x4000], signed
+
+
+def check_ads8688_names_what_is_wrong():
+    for byte in (0, 0xFF):
+        assert raises(reasons.Fault, Ads8688(Constant(byte), Pin(1)).start, 2).code == reasons.ADC_SILENT
+    assert raises(reasons.Fault, Ads8688(Constant(0x5A), Pin(1)).start, 2).code == reasons.WRONG_CHIP
+    cs = Pin(1)
+    raises(OSError, Ads8688(BrokenSpi(), cs).start, 2)
+    assert cs.level == 1
+
+
+class Constant:  # a bus that reads the same byte for ever
+    def __init__(self, byte):
+        self._byte = byte
+
+    def write_readinto(self, out, into):
+        for i in range(len(into)):
+            into[i] = self._byte
 
 
 def check_flip_pulses_one_pin_at_a_time():

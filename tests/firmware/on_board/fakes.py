@@ -65,6 +65,8 @@ class Flip:
 
 
 class Dac:
+    zero = 32768
+
     def __init__(self):
         self.codes = [0] * 4
 
