@@ -1,5 +1,8 @@
 """One build, three ways to the board: the same firmware runs, and what is in its way is found and said."""
 
+import json
+import subprocess
+import sys
 import time
 from dataclasses import replace
 
@@ -203,6 +206,11 @@ def test_what_shadows_rom_is_said_and_removed_when_asked(built, started):
     assert done.strays.idle == ("/lib/bp_main.py",)
     assert "/bp_flip.py is imported instead" in done.reasons[0]
     assert romfs._hashes(twin.port, 512)[0] == sha256(b"\xff" * 512)  # nothing was written
+    command = [sys.executable, "-m", "barberpole", "flash", str(first.folder), "--port", twin.port, "--json"]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    answer = json.loads(said.stdout)
+    assert said.returncode == 1
+    assert (answer["pass"], answer["way"], answer["shadows"]) == (False, "romfs", ["/bp_flip.py"])
     done = flash(first.folder, twin.port, remove_shadows=True)
     assert done.passed
     assert done.strays.idle == ()
