@@ -44,6 +44,21 @@ def test_the_worked_example_runs_on_what_the_demo_leaves(tmp_path, capsys, monke
         assert run(line.split()) == 0, capsys.readouterr().err
     assert "cross_field" in Path("demo/model-1.toml").read_text()
     assert read_calibration(Path("calibration.toml")).selfcal is not None
+    _report_of_two_power_ups(capsys)
+
+
+def _report_of_two_power_ups(capsys):
+    capsys.readouterr()
+    runs = ["demo/before-selfcal.bpr", "demo/after-selfcal.bpr"]
+    assert run(["report", *runs, "--calibration", "demo/calibration-2.toml", "-o", "r.html", "--json"]) == 0
+    for one in json.loads(capsys.readouterr().out)["logs"]:
+        assert (one["verdict"], one["fit"]) == ("accepted", None)
+        # the gains that the demo gave the emulated board, as the host finds them in the board's points
+        assert one["selfcal"]["host"]["gain"] == pytest.approx([1.004, 0.997, 1.002], abs=2e-4)
+        assert one["selfcal"]["board_gain"] == pytest.approx(one["selfcal"]["host"]["gain"], abs=1e-3)
+    page = Path("r.html").read_text()
+    assert "Do the gains hold from power-up to power-up?" in page
+    assert "The coil run is straight within" in page
 
 
 def test_with_nothing_hidden_it_says_so(tmp_path, capsys):
