@@ -20,6 +20,7 @@ lint: $(STAMP) $(STUBS)/.installed
 	@$(BIN)/ruff format --check --quiet || { $(BIN)/ruff format --diff --quiet; echo "run: $(BIN)/ruff format"; exit 1; }
 	@$(BIN)/pyright --warnings
 	@$(BIN)/pyright --warnings --project firmware/pyrightconfig.json
+	@$(BIN)/pyright --warnings --project firmware/driver/pyrightconfig.json
 
 bench: $(STAMP)
 	@$(BIN)/python -m pytest -m bench -s

@@ -9,9 +9,6 @@ budget.json     flash, RAM and time
 build.json      hashes, and which file goes where on the board
 """
 
-import json
-import os
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +18,10 @@ from barberpole import mpy, paths
 from barberpole.board import Board, load_board
 from barberpole.built import LISTING, MAIN, romfs_image, sha256
 from barberpole.calibration import Calibration, read_calibration
-from barberpole.errors import InputError, must
 
 from barberpole_codegen import budget, image, ways
 from barberpole_codegen.flash_map import Definition, definition
+from barberpole_codegen.folder import as_json, require_replaceable, write_folder
 from barberpole_codegen.modules import VERSION, Generated, generate
 from barberpole_codegen.narrow import Precision
 from barberpole_codegen.rows import AUTO
@@ -66,7 +63,7 @@ def build(
     board = board if isinstance(board, Board) else load_board(board)
     calibration = calibration if isinstance(calibration, Calibration) else read_calibration(calibration)
     out_dir = Path(out_dir)
-    _require_replaceable(out_dir)
+    require_replaceable(out_dir)
     say("tracing the compensation and checking it in float32")
     made = generate(board, calibration, path)
     sources = {**image.firmware_sources(paths.firmware()), **made.texts}
@@ -81,8 +78,8 @@ def build(
     head = (out_dir, build_hash, board.name, calibration.model.hash, calibration.hash, made.table.id)
     result = BuildResult(*head, files, made.precision, costs)
     content = _content(sources, compiled, rom, costs) | ways.definition_files(found)
-    content[LISTING] = _json(_describe(result, content, ways.firmware(found)))
-    _write(out_dir, content)
+    content[LISTING] = as_json(_describe(result, content, ways.firmware(found)))
+    write_folder(out_dir, content)
     say(f"built {out_dir}")
     return result
 
@@ -90,13 +87,6 @@ def build(
 def _compile(sources: dict[str, str]) -> dict[str, bytes]:
     modules = sorted(name for name in sources if name != MAIN)
     return {name.replace(".py", ".mpy"): mpy.compile_module(name, sources[name]) for name in modules}
-
-
-def _require_replaceable(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(must("the output", "a folder", "a file", folder))
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / LISTING).exists():
-        raise InputError(must("the output", "a new or empty folder, or a former build", "a folder with files", folder))
 
 
 def _costs(
@@ -138,7 +128,7 @@ def _content(
     content = {f"src/{name}": text.encode() for name, text in sources.items()}
     content |= {f"mpy/{name}": data for name, data in compiled.items()}
     listed = image.manifest(list(sources)).encode()
-    content |= {"romfs.img": rom, "manifest.py": listed, "budget.json": _json(costs)}
+    content |= {"romfs.img": rom, "manifest.py": listed, "budget.json": as_json(costs)}
     return content
 
 
@@ -163,28 +153,3 @@ def _entry(source: str, target: str, data: bytes) -> dict[str, Any]:
     if source.endswith(".mpy") and mpy.architecture(data):
         entry["text"] = source.replace("mpy/", "src/").replace(".mpy", ".py")
     return entry
-
-
-def _write(folder: Path, content: dict[str, bytes]) -> None:
-    """The whole folder beside its place, then moved there; a former build is moved away first and put back on error."""
-    beside = folder.with_name(f"{folder.name}.tmp-{os.getpid()}")
-    old = folder.with_name(f"{folder.name}.old-{os.getpid()}")
-    try:
-        for name, data in content.items():
-            path = beside / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-        if folder.exists():
-            folder.rename(old)
-        beside.rename(folder)
-    except OSError as error:
-        if old.exists() and not folder.exists():
-            old.rename(folder)
-        raise InputError(must("the output folder", "one that can be written", error.strerror, folder)) from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
-
-
-def _json(value: Any) -> bytes:
-    return (json.dumps(value, indent=1, sort_keys=True) + "\n").encode()

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from barberpole.board import Board
 from barberpole.calibration import Calibration
+from barberpole.driver_board import Driver
 from barberpole.fitted import from_calibration
 from barberpole.trajectory import CodeTable, code_table, for_board
 
@@ -66,7 +67,7 @@ def board_text(board: Board) -> str:
     return module(title, f"board {board.name}", VERSION, constants=settings.board_constants(board))
 
 
-def trajectory_text(board: Board, table: CodeTable) -> str:
+def trajectory_text(board: Board | Driver, table: CodeTable) -> str:
     title = f"bp_trajectory.py: {table.points} points of coil current ({table.name}), as DAC codes."
     note = "One bytes object: it stays in flash where the module is frozen or in ROMFS. A list would be copied to RAM."
     return module(title, f"board {board.name}", VERSION, [note], settings.trajectory_constants(table))

@@ -27,9 +27,9 @@ def adc_registers(board: Board) -> list[Constant]:
     m08 = adc.part == "ads131m08"
     gain1, gain2 = _gain_registers(adc.pga, channels) if m08 else (0, 0)
     if m08:
-        _require_frame_time(adc.baud, adc.sample_hz)
+        require_frame_time(adc.baud, adc.sample_hz)
     span = SPANS_V[adc.part].index(adc.vref_v) if adc.part in SPANS_V else 0
-    ratio = _ratio_code(adc.sample_hz) if m08 else 0
+    ratio = ratio_code(adc.sample_hz) if m08 else 0
     return [
         Constant("ADC_RATIO_CODE", ratio, f"{adc.sample_hz:g} conversions a second"),
         Constant("ADC_GAIN1", gain1, "channels 0 to 3"),
@@ -80,7 +80,7 @@ def _gain_registers(pga: int, bridges: tuple[int, ...]) -> tuple[int, int]:
     return both & 0xFFFF, both >> 16
 
 
-def _ratio_code(sample_hz: float) -> int:
+def ratio_code(sample_hz: float) -> int:
     """CLOCK.OSR: the power of two by which the oversampling ratio exceeds the smallest."""
     ratio = MODULATOR_HZ / FIRST_RATIO / sample_hz
     code = round(math.log2(ratio))
@@ -90,7 +90,7 @@ def _ratio_code(sample_hz: float) -> int:
     return code
 
 
-def _require_frame_time(baud: int, sample_hz: float) -> None:
+def require_frame_time(baud: int, sample_hz: float) -> None:
     """A frame must be read before the next conversion, or conversions are lost."""
     needed = FRAME_BITS * sample_hz
     if baud < needed:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from barberpole.board import Board
+from barberpole.driver_board import Driver
 from barberpole.errors import LimitError, must
 
 from barberpole_codegen.emit import Constant, module
@@ -29,7 +30,9 @@ def mark(sources: Mapping[str, str], calibration: str, version: str) -> str:
     return module("bp_build.py: which build this is.", f"sources {build}", version, constants=constants)
 
 
-def figures(board: Board, files: Mapping[str, int], romfs_bytes: int, found: Definition | None) -> dict[str, Any]:
+def figures(
+    board: Board | Driver, files: Mapping[str, int], romfs_bytes: int, found: Definition | None
+) -> dict[str, Any]:
     """Bytes that each way takes (`bytes`) and has (`of`), and whether it fits.
 
     Raises LimitError where the files exceed the board's file system: that way must be open to every board.

@@ -22,17 +22,19 @@ TABLES = ("flip", "adc", "dac", "coils", "selfcal", "timing")
 def load_board(name_or_path: str | Path) -> Board:
     """A board by name ("pybv11") or path, with its sensor. Raises InputError or LimitError."""
     board = read_board(name_or_path)
-    check_board(board, _find(name_or_path, paths.boards(), "board"))
+    check_board(board, find_file(name_or_path, paths.boards(), "board"))
     return board
 
 
 def read_board(name_or_path: str | Path) -> Board:
     """A board that is well-formed, whatever it asks of its parts. Raises InputError."""
-    path = _find(name_or_path, paths.boards(), "board")
+    path = find_file(name_or_path, paths.boards(), "board")
     tables = read_toml(path, "the board file")
     head = tables.pop("board", None)
     if not isinstance(head, dict):
         raise InputError(must("the board file", "one with a table [board]", "none", path))
+    if head.get("role", "sensor") != "sensor":
+        raise InputError(must("the board file", "one of a sensor board", f"the role {head['role']!r}", path))
     _only_tables(tables, path)
     sensor = head.get("sensor")
     if not isinstance(sensor, str):
@@ -43,7 +45,7 @@ def read_board(name_or_path: str | Path) -> Board:
 
 def load_sensor(name_or_path: str | Path) -> Sensor:
     """A sensor by name ("hmc1021_1022") or path. Raises InputError."""
-    path = _find(name_or_path, paths.boards() / "sensors", "sensor")
+    path = find_file(name_or_path, paths.boards() / "sensors", "sensor")
     tables = read_toml(path, "the sensor file")
     if set(tables) != {"sensor"} or not isinstance(tables["sensor"], dict):
         raise InputError(must("the sensor file", "one table [sensor]", ", ".join(tables) or "nothing", path))
@@ -61,7 +63,8 @@ def _beside(path: Path, sensor: str) -> str | Path:
     return path.parent / sensor if sensor.endswith(".toml") else sensor
 
 
-def _find(name_or_path: str | Path, folder: Path, what: str) -> Path:
+def find_file(name_or_path: str | Path, folder: Path, what: str) -> Path:
+    """The file of a name in `folder`, or a .toml path as it is. Raises InputError with the closest name."""
     if str(name_or_path).endswith(".toml"):
         return Path(name_or_path)
     known = sorted(path.stem for path in folder.glob("*.toml"))

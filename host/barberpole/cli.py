@@ -21,6 +21,7 @@ from barberpole.commands import (
     design,
     doctor,
     fleet,
+    imcs,
     methods,
     report,
     trajectory,
@@ -45,6 +46,7 @@ methods.register(app)
 characterise.register(app)
 board.register(app)
 board_check.register(app)
+imcs.register(app)
 trajectory.register(app)
 design.register(app)
 challenge.register(app)

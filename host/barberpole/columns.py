@@ -18,8 +18,11 @@ KNOWN = frozenset(SINGLES).union(*TRIPLES)
 _UNIT_OF = {stem: unit for stem, _, unit in (name.rpartition("_") for name in KNOWN) if stem}
 
 
-def check_names(names: Sequence[str], where: object) -> None:
-    """Raise InputError about a name that is empty, there twice, in a wrong unit, or without its two companions."""
+def check_names(names: Sequence[str], where: object, readings: bool = True) -> None:
+    """Raise InputError about a name that is empty, there twice, in a wrong unit, or without its two companions.
+
+    readings: whether there must be any; the record of a coil driver has none.
+    """
     seen: set[str] = set()
     for number, name in enumerate(names, start=1):
         if not name:
@@ -30,7 +33,8 @@ def check_names(names: Sequence[str], where: object) -> None:
         _check_unit(name, where)
     for triple in TRIPLES:
         _check_complete(triple, seen, where)
-    _check_readings(seen, where)
+    if readings:
+        _check_readings(seen, where)
 
 
 def unknown(names: Iterable[str]) -> tuple[str, ...]:

@@ -5,14 +5,16 @@ import sys
 from pathlib import Path
 
 from barberpole.board_tables import Board
+from barberpole.driver_board import Driver
 from barberpole.files import write_atomic
 from barberpole.sensor import Sensor
 from barberpole.tables import describe, table_of
 
 INTRODUCTION = """# Board and sensor files
 
-Every key of `boards/<board>.toml` and `boards/sensors/<sensor>.toml`. Written by `make docs` from the tables in
-`barberpole.board_tables` and `barberpole.sensor`; `barberpole.board_checks` says which values go together.
+Every key of `boards/<board>.toml`, `boards/drivers/<driver>.toml` and `boards/sensors/<sensor>.toml`. Written by
+`make docs` from the tables in `barberpole.board_tables`, `barberpole.driver_board` and `barberpole.sensor`;
+`barberpole.board_checks` says which values go together.
 """
 
 
@@ -20,6 +22,7 @@ def board_reference() -> str:
     """Markdown: one table of keys for each TOML table."""
     parts = [INTRODUCTION, "## Boards\n"]
     parts += [_keys(name, kind) for name, kind in _tables("board", Board)]
+    parts += ["## Coil drivers\n", *(_keys(name, kind) for name, kind in _tables("board", Driver))]
     parts += ["## Sensors\n", *(_keys(name, kind) for name, kind in _tables("sensor", Sensor))]
     return "\n".join(parts)
 
@@ -32,7 +35,7 @@ def write_docs(folder: Path) -> None:
 
 def _tables(name: str, kind: type) -> list[tuple[str, type]]:
     """The table and those inside it, depth first. A sensor is a file of its own."""
-    prefix = "" if kind is Board else f"{name}."
+    prefix = "" if kind in (Board, Driver) else f"{name}."
     found = [(name, kind)]
     for field in dataclasses.fields(kind):
         inner = table_of(kind, field.name)

@@ -105,6 +105,9 @@ def _from_parquet(data: bytes, path: Path) -> Log:
 
 def _from_records(data: bytes, path: Path) -> Log:
     found = read_board_log(data, path)
+    if found.meta.get("role") == "coil_driver":
+        wanted = "one of a sensor (`barberpole imcs` joins it with its driver's)"
+        raise InputError(must("the log", wanted, "the currents of a coil driver", path))
     return Log(found.columns, path, _sha256(data), found.skipped, found.notes, found.meta, found.selfcal)
 
 

@@ -4,8 +4,11 @@ import difflib
 from pathlib import Path
 
 import pytest
+from barberpole.driver_board import load_driver
+from barberpole.trajectory import driver_table, for_driver
+from barberpole_codegen.driver import board_text
 from barberpole_codegen.emit import Constant, Function, literal, module, number
-from barberpole_codegen.modules import generate
+from barberpole_codegen.modules import generate, trajectory_text
 from barberpole_codegen.trace import trace
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -21,6 +24,20 @@ def test_text_is_the_accepted_one(name, generated, update):
         difflib.unified_diff(accepted.splitlines(True), text.splitlines(True), "accepted", "generated")
     )
     assert not difference, difference + "\nto accept it: pytest tests/codegen --update"
+
+
+@pytest.mark.parametrize("name", ["bp_board.py", "bp_trajectory.py"])
+def test_text_of_the_driver_is_the_accepted_one(name, update):
+    driver = load_driver("imcs_driver")
+    texts = {
+        "bp_board.py": board_text(driver),
+        "bp_trajectory.py": trajectory_text(driver, driver_table(for_driver(driver), driver)),
+    }
+    path = GOLDEN / "driver" / name
+    if update:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(texts[name])
+    assert texts[name] == (path.read_text() if path.exists() else ""), "to accept it: pytest tests/codegen --update"
 
 
 def test_text_depends_on_nothing_else(board, calibration, generated):

@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 
 from barberpole.calibration import read_calibration
+from barberpole.commands import imcs
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress, table
+from barberpole.driver_board import is_driver
 from barberpole.link.deploy import Flashed
 from barberpole.link.deploy import flash as flash_board
 from barberpole.link.deploy import pull as pull_run
@@ -31,9 +33,14 @@ def build(
     board: Annotated[str, typer.Argument(help="Board name or .toml.")],
     calibration: Annotated[Path | None, typer.Option(help="calibration.toml; without one, data-sheet values.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write.")] = Path("build"),
+    replay: Annotated[Path | None, typer.Option(help="For a coil driver: a log of a turned sensor to play.")] = None,
     as_json: bool = AS_JSON,
 ) -> None:
     """Write the flash-resident modules, .mpy files, manifest, ROMFS image and budget."""
+    if is_driver(board):
+        made = imcs.build_driver(board, replay, output, None if as_json else lambda text: OUT.print(text, style="dim"))
+        print_json(made) if as_json else OUT.print(f"trajectory {made['trajectory']} in {output}")
+        return
     from barberpole_codegen.build import build as build_board
 
     from barberpole.board import load_board

@@ -2,6 +2,18 @@
 
 from barberpole.trajectory.replay import replay
 from barberpole.trajectory.shapes import Trajectory, axes, sine, sphere, steps
-from barberpole.trajectory.table import CodeTable, code_table, for_board
+from barberpole.trajectory.table import CodeTable, code_table, driver_table, for_board, for_driver
 
-__all__ = ["CodeTable", "Trajectory", "axes", "code_table", "for_board", "replay", "sine", "sphere", "steps"]
+__all__ = [
+    "CodeTable",
+    "Trajectory",
+    "axes",
+    "code_table",
+    "driver_table",
+    "for_board",
+    "for_driver",
+    "replay",
+    "sine",
+    "sphere",
+    "steps",
+]

@@ -7,11 +7,13 @@ wanted field, so that rounding to codes is no error of the run.
 """
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from barberpole.board import Board
+from barberpole.driver_board import Driver
 from barberpole.errors import LimitError, must
 from barberpole.trajectory.shapes import AXES, Array, Trajectory, sphere
 
@@ -68,10 +70,29 @@ def code_table(trajectory: Trajectory, board: Board) -> CodeTable:
     """Eq. (1). Raises LimitError where a current, a code or the field exceeds what the board bears."""
     sensor = board.sensor
     _within(np.abs(trajectory.field_ut), sensor.range_ut, "µT", "the coil field", "the sensor's range")
-    current_ma = trajectory.field_ut / sensor.offset_coil_ut_per_ma
-    _within(np.abs(current_ma), board.coils.max_ma, "mA", "the coil current", "coils.max_ma")
-    zero = 1 << (board.dac.bits - 1)
-    full_scale_ma = np.asarray(board.coils.full_scale_ma, float)
+    constant = (sensor.offset_coil_ut_per_ma,) * 3
+    return codes_of(trajectory, constant, board.coils.full_scale_ma, board.coils.max_ma, board.dac.bits)
+
+
+def for_driver(driver: Driver) -> Trajectory:
+    """The turn of the field that the driver file asks for. Raises InputError."""
+    return sphere(tuple(driver.drive.radii_ut), driver.drive.points)
+
+
+def driver_table(trajectory: Trajectory, driver: Driver) -> CodeTable:
+    """Eq. (1) for a Helmholtz coil. Raises LimitError where a current or a code exceeds what the driver bears."""
+    coils = driver.coils
+    return codes_of(trajectory, coils.ut_per_ma, coils.full_scale_ma, coils.max_ma, driver.dac.bits)
+
+
+def codes_of(
+    trajectory: Trajectory, ut_per_ma: Sequence[float], full_ma: Sequence[float], max_ma: float, bits: int
+) -> CodeTable:
+    """Eq. (1) for coils of these constants and ends of scale, three each."""
+    current_ma = trajectory.field_ut / np.asarray(ut_per_ma, float)
+    _within(np.abs(current_ma), max_ma, "mA", "the coil current", "coils.max_ma")
+    zero = 1 << (bits - 1)
+    full_scale_ma = np.asarray(full_ma, float)
     codes = np.round(zero * (1.0 + current_ma / full_scale_ma))
     if codes.min() < 0 or codes.max() > 2 * zero - 1:
         got = f"{codes.min():.0f} to {codes.max():.0f}"

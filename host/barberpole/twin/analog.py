@@ -6,11 +6,12 @@ the filter has settled, and what is not settled yet is taken off the present vol
 
 import math
 from collections.abc import Callable
+from typing import Protocol
 
 from barberpole.board import Board
 from barberpole.twin.noise import Noise, NoiseLevel
 from barberpole.twin.physics import sinc3_step
-from barberpole.twin.sensor_head import AXES, INPUTS, SensorHead
+from barberpole.twin.sensor_head import AXES, INPUTS
 from barberpole.twin.world import World
 
 FILTER_PERIODS = 3  # length of a sinc3's impulse response
@@ -18,10 +19,18 @@ LONGEST_PERIOD_US = 4000.0  # of the converter's data rates
 CONVERTER_NOISE_V = 8e-6  # ADS131M08 at gain 1 and 8 kHz, rms of one conversion (data sheet, noise table, about)
 
 
+class Head(Protocol):
+    """What the inputs look at."""
+
+    def volts(self, t_s: float) -> list[float]:
+        """Voltage on every input at t_s, without noise; the same list while nothing changes, or a new one."""
+        ...
+
+
 class AnalogInputs:
     """The voltages of all inputs, conversion by conversion."""
 
-    def __init__(self, head: SensorHead, noise: Noise):
+    def __init__(self, head: Head, noise: Noise):
         self.head = head
         self._noise = noise
         self._steps: list[tuple[float, list[float]]] = []

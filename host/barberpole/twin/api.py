@@ -16,9 +16,9 @@ from collections.abc import Iterable, Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import barberpole
-from barberpole.board import Board
 from barberpole.errors import InputError, PortError, must
 from barberpole.twin.faults import check_faults
 from barberpole.twin.flash import make_frozen, make_image, make_partition
@@ -26,7 +26,7 @@ from barberpole.twin.interpreter import find_micropython
 from barberpole.twin.pins import check_pins
 from barberpole.twin.process import Power
 from barberpole.twin.running import Job
-from barberpole.twin.world import World
+from barberpole.twin.wiring import AnyBoard, AnyWorld, default_world
 
 ANSWER_S = 30.0
 STOP_S = 5.0
@@ -38,9 +38,9 @@ class Twin:
 
     def __init__(
         self,
-        board: Board,
+        board: AnyBoard,
         flash_dir: str | Path,
-        world: World | None = None,
+        world: AnyWorld | None = None,
         seed: int = 0,
         faults: Iterable[str] = (),
         files: Mapping[str, str | Path] | None = None,
@@ -53,7 +53,7 @@ class Twin:
         folder whose modules and main program stand in for those frozen into the firmware.
         Raises InputError for an unknown fault or pin, a missing interpreter or files that do not fit.
         """
-        self.world = World.of(board) if world is None else world
+        self.world: Any = default_world(board) if world is None else world
         check_pins(board)
         self._board, self._seed, self._faults = board, check_seed(seed), check_faults(faults)
         self._image = (Path(flash_dir) / f"{board.name}.lfs2").resolve()
@@ -107,7 +107,7 @@ class Twin:
 
     def power_cycle(
         self,
-        world: World | None = None,
+        world: AnyWorld | None = None,
         seed: int | None = None,
         faults: Iterable[str] | None = None,
         cut_s: float = math.inf,

@@ -9,7 +9,9 @@ from pathlib import Path
 from types import FrameType
 
 from barberpole.board import load_board
+from barberpole.driver_board import is_driver, load_driver
 from barberpole.twin.api import Twin
+from barberpole.twin.driven import CoilWorld
 from barberpole.twin.world import World
 
 ALIVE_S = 0.5
@@ -30,8 +32,11 @@ def run_twin(
     hidden: effects of world.HIDDEN ("none": an ideal sensor; empty: its cross-field effect). flash_dir: where the
     flash image is kept; None: nowhere, the board starts empty. romfs_kib, frozen: as of Twin. Raises BarberpoleError.
     """
-    board = load_board(board_name)
-    world = World.of(board, tuple(hidden) or DEFAULT_HIDDEN)
+    if is_driver(board_name):
+        board, world = load_driver(board_name), CoilWorld()
+    else:
+        board = load_board(board_name)
+        world = World.of(board, tuple(hidden) or DEFAULT_HIDDEN)
     with contextlib.ExitStack() as stack:
         folder = flash_dir or stack.enter_context(tempfile.TemporaryDirectory(prefix="barberpole-twin-"))
         signal.signal(signal.SIGTERM, _stop)

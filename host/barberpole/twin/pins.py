@@ -1,6 +1,7 @@
 """Names of the pyboard's pins, in the order that numbers them between interpreter and emulator."""
 
 from barberpole.board import Board
+from barberpole.driver_board import Driver
 from barberpole.errors import InputError, must
 
 PINS = (
@@ -12,10 +13,11 @@ SPI_CLOCK_HZ = {1: 84_000_000, 2: 42_000_000}
 """Clock before the prescaler of each SPI: APB2 and APB1 of the STM32F405."""
 
 
-def check_pins(board: Board) -> None:
+def check_pins(board: Board | Driver) -> None:
     """Raises InputError where the board file uses a pin or a bus that the pyboard does not have."""
-    flip, adc, dac = board.flip, board.adc, board.dac
-    for pin in (flip.set_pin, flip.reset_pin, adc.cs_pin, adc.drdy_pin, adc.reset_pin, dac.cs_pin):
+    adc, dac = board.adc, board.dac
+    flip = (board.flip.set_pin, board.flip.reset_pin) if isinstance(board, Board) else ()
+    for pin in (*flip, adc.cs_pin, adc.drdy_pin, adc.reset_pin, dac.cs_pin):
         if pin not in PINS:
             raise InputError(must("a pin of the emulated board", "one of the pyboard's", pin, board.name))
     for spi in (adc.spi, dac.spi):

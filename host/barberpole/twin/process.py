@@ -16,8 +16,7 @@ from multiprocessing.connection import Connection
 from barberpole.twin.ads131m08 import NEVER_US
 from barberpole.twin.port import Port
 from barberpole.twin.running import HARD, POWER_ON, SOFT, Ending, Job, Running, Start
-from barberpole.twin.soldered import Soldered
-from barberpole.twin.world import World
+from barberpole.twin.wiring import AnyWorld, Wiring, wired
 
 LOG_BYTES = 8 << 20
 LOOK_S = 0.02  # how often it is checked whether somebody opened the port
@@ -28,7 +27,7 @@ MAX_CRASHES = 3
 class Power:
     """What one power-up is made of."""
 
-    world: World
+    world: AnyWorld
     seed: int
     faults: frozenset[str]
     cut_s: float = math.inf
@@ -46,7 +45,7 @@ class BoardProcess:
         self._watch(control.fileno(), True)
         self._power_ups = self._crashes = 0
         self._power: Power | None = None
-        self._soldered: Soldered | None = None
+        self._soldered: Wiring | None = None
         self._running: Running | None = None
         self._now_us = self._start_us = 0
         self._cut = False
@@ -119,7 +118,7 @@ class BoardProcess:
         self._power_ups += 1
         self._crashes = 0
         self._cut = False
-        self._soldered = Soldered(self._job.board, power.world, power.seed, self._power_ups, power.faults)
+        self._soldered = wired(self._job.board, power.world, power.seed, self._power_ups, power.faults)
         self._start(POWER_ON)
 
     def _power_off(self) -> None:

@@ -7,13 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from barberpole.board import Board
 from barberpole.twin.ads131m08 import NEVER_US
 from barberpole.twin.console import Console
 from barberpole.twin.interpreter import Interpreter
 from barberpole.twin.pins import PINS, SPI_CLOCK_HZ
-from barberpole.twin.soldered import Soldered
 from barberpole.twin.wire import Op, Wire
+from barberpole.twin.wiring import AnyBoard, Wiring
 
 INTERRUPT_S = 0.1  # a program that asks nothing for so long is interrupted by a signal
 INSIST_S = 2.0  # and one that asks only what must not be interrupted, after this
@@ -26,7 +25,7 @@ CTRL_A, CTRL_C = b"\x01", b"\x03"
 class Job:
     """What makes a board, whatever its power does."""
 
-    board: Board
+    board: AnyBoard
     micropython: str
     image: Path
     romfs: Path | None = None
@@ -62,7 +61,7 @@ class Ending:
 class Running:
     """A running interpreter; `say` gets its output."""
 
-    def __init__(self, job: Job, soldered: Soldered, start: Start, say: Callable[[bytes], None]):
+    def __init__(self, job: Job, soldered: Wiring, start: Start, say: Callable[[bytes], None]):
         self._say = say
         self._console = Console(start.raw)
         self._wire = Wire(soldered, self._on_op, start.now_us)
@@ -194,7 +193,7 @@ class Running:
         return Ending(status, self._console.raw, self._wire.now_us, self._hard)
 
 
-def heap_bytes(board: Board) -> int:
+def heap_bytes(board: AnyBoard) -> int:
     """The board's heap, doubled: objects of the 64-bit interpreter are twice the size."""
     return 2 * 1024 * max(board.ram_kib - PORT_RAM_KIB, 32)
 

@@ -7,7 +7,7 @@ import select
 import struct
 from collections.abc import Callable
 
-from barberpole.twin.soldered import Soldered
+from barberpole.twin.wiring import Wiring
 
 WORD = 8
 _HEAD = struct.Struct("<qq")
@@ -22,7 +22,7 @@ class Op(enum.IntEnum):
 class Wire:
     """One end of the two pipes to the interpreter of one start."""
 
-    def __init__(self, soldered: Soldered, on_op: Callable[[Op], None], now_us: int):
+    def __init__(self, soldered: Wiring, on_op: Callable[[Op], None], now_us: int):
         self._soldered = soldered
         self._on_op = on_op
         self.now_us = now_us

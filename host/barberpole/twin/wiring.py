@@ -1,0 +1,55 @@
+"""The two roles of an emulated board behind one face: a sensor board, or a coil driver."""
+
+from typing import Protocol
+
+from barberpole.board import Board
+from barberpole.driver_board import Driver
+from barberpole.errors import InputError, must
+from barberpole.twin.driven import CoilWorld, Wired
+from barberpole.twin.soldered import Soldered
+from barberpole.twin.world import World
+
+AnyBoard = Board | Driver
+AnyWorld = World | CoilWorld
+
+
+class Wiring(Protocol):
+    """Everything on a board but its microcontroller. Times are µs since power-up."""
+
+    def pin(self, t_us: int, pin: int, level: int) -> None:
+        """An output of the microcontroller has changed."""
+        ...
+
+    def release_pins(self, t_us: int) -> None:
+        """The microcontroller resets: its pins float."""
+        ...
+
+    def transfer(self, t_us: int, bus: int, data: bytes) -> bytes:
+        """Bytes over an SPI bus."""
+        ...
+
+    def ready_at(self, t_us: int) -> int:
+        """When the converter's data-ready goes low."""
+        ...
+
+    def take_charge_us(self) -> int:
+        """Time that arithmetic has taken since the last call."""
+        ...
+
+    def truth(self, t_us: int) -> dict:
+        """What is hidden."""
+        ...
+
+
+def wired(board: AnyBoard, world: AnyWorld, seed: int, power_up: int, faults: frozenset[str]) -> Wiring:
+    """The board's parts in their world. Raises InputError where the two are of different roles."""
+    if isinstance(board, Driver) and isinstance(world, CoilWorld):
+        return Wired(board, world, seed, power_up, faults)
+    if isinstance(board, Board) and isinstance(world, World):
+        return Soldered(board, world, seed, power_up, faults)
+    raise InputError(must("the world", "one of the board's role", type(world).__name__, board.name))
+
+
+def default_world(board: AnyBoard) -> AnyWorld:
+    """The believable specimen."""
+    return CoilWorld() if isinstance(board, Driver) else World.of(board)
