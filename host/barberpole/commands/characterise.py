@@ -71,7 +71,7 @@ def _json(sheet: Sheet) -> dict:
 
 
 def simulate(
-    sensor: Annotated[str, typer.Argument(help="Sensor name or .toml with a table [sensor.digital].")],
+    sensor: Annotated[str, typer.Argument(help="Sensor name or .toml with a table sensor.digital.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Log to write (.csv or .parquet).")],
     program: Annotated[str, typer.Option(help=f"One of {', '.join(PROGRAMS)} (article 2.4).")] = "linearity",
     temp: Annotated[float, typer.Option(help="Temperature in °C.")] = 25.0,
