@@ -43,7 +43,7 @@ def read_csv(data: bytes, where: object) -> tuple[Columns, list[str], int]:
 def read_parquet(data: bytes, where: object) -> tuple[Columns, list[str], dict[str, Any]]:
     """Columns of a Parquet file, notes, and the metadata that `write_parquet` put there."""
     try:
-        table = pa_parquet.read_table(pa.BufferReader(data))
+        table = pa_parquet.read_table(pa.BufferReader(data), use_threads=len(data) > THREADS_FROM)
         meta = json.loads((table.schema.metadata or {}).get(_META, b"{}"))
     except (ValueError, OSError) as error:
         raise InputError(must("the log", "a Parquet file", _short(error), where)) from None

@@ -237,3 +237,21 @@ def test_boards_are_verified_against_their_own_calibration(folder, plain, tmp_pa
 def test_bad_input_is_one_sentence(words, said, folder, capsys):
     assert cli.run([word.format(folder=folder) for word in words]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.bench
+def test_two_thousand_boards(tmp_path):
+    """2000 boards of 2000 rows, 12 parameters, on two cores: at least 150 boards a second are wanted."""
+    for at in range(2000):
+        pq.write_table(pa.table(turned(at, 2000)), tmp_path / f"board{at:04}.parquet")
+    run(
+        logs([str(tmp_path / "board000?.parquet")]),
+        settings_of("fit", MODEL),
+        tmp_path / "warm.parquet",
+        pool.processes(2),
+    )
+    paths = logs([str(tmp_path / "board*.parquet")])
+    found = run(paths, settings_of("fit", MODEL), tmp_path / "fleet.parquet", pool.processes(2))
+    print(f"\nfleet fit, 2000 boards of 2000 rows        {found.rate:9.0f} boards/s (wanted 150)", end="")
+    assert not found.failed
+    assert (found.known, len(found.rows)) == (0, 2000)

@@ -24,6 +24,7 @@ from barberpole.fleet.prior import prior_of
 from barberpole.fleet.scores import scores
 from barberpole.fleet.settings import settings_of
 from barberpole.fleet.spread import spreads
+from barberpole.fleet.summary import summarise
 from barberpole.fleet.table import read_fleet, write_fleet
 from barberpole.fleet.work import fitted_row
 from barberpole.log import Log
@@ -289,3 +290,55 @@ def test_a_prior_of_another_kind_is_refused(factory):
     scalar = observations(replace(log, columns={k: v for k, v in log.columns.items() if k.endswith("lsb")}))
     with pytest.raises(InputError, match="the same reference"):
         fit_with_prior(scalar, MODEL, prior_of(read_fleet(factory), MODEL))
+
+
+def test_boards_that_stand_out_and_that_have_changed(factory):
+    found = summarise(read_fleet(factory))
+    assert {(one.board, one.what) for one in found.outliers} == {("board007", "bias.x")}
+    assert found.outliers[0].why.startswith("bias.x is ")
+    assert {(one.board, one.parameter) for one in found.changes} == {("board000", "bias.z")}
+    change = found.changes[0]
+    assert change.values[1] - change.values[0] == pytest.approx(5.0, abs=1e-6)
+    assert change.dates == (None, "2027-05-01")
+    assert [one["log"] for one in found.failed] == ["lot1/board999.parquet"]
+
+
+def test_the_report_says_and_draws_it(factory, tmp_path, capsys):
+    page = tmp_path / "fleet.html"
+    assert cli.run(["fleet", "report", str(factory), "-o", str(page), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["logs"], said["boards"], len(said["parameters"])) == (62, 61, 12)
+    text = page.read_text()
+    assert "Boards that stand out: 1 of 61; changed: 1; logs that could not be used: 1 of 62." in text
+    assert cli.run(["fleet", "report", str(factory)]) == 0
+    assert "board007: bias.x is" in capsys.readouterr().out
+
+
+def test_common_and_individual_as_a_command(factory, capsys):
+    assert cli.run(["fleet", "common", str(factory), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["parameters"]
+    assert (said["scale.x"]["kind"], said["bias.x"]["kind"]) == ("common", "individual")
+    assert cli.run(["fleet", "common", str(factory)]) == 0
+    assert "individual" in capsys.readouterr().out
+    assert cli.run(["fleet", "common", str(factory), "--lot", "lot9"]) == 2
+    assert "--lot must be one of lot1; got 'lot9'" in capsys.readouterr().err
+
+
+def test_a_board_of_the_fleet_as_a_calibration_file(factory, tmp_path, capsys):
+    output = tmp_path / "calibration.toml"
+    assert cli.run(["fleet", "extract", str(factory), "board005", "-o", str(output)]) == 0
+    log, _ = board_log(5, common_scale=True)
+    assert read_calibration(output).hash == calibration_of(fit_log(log, MODEL), log, MODEL).hash
+    assert cli.run(["fleet", "extract", str(factory), "nobody", "-o", str(output)]) == 2
+    assert "board nobody must be one that was fitted" in capsys.readouterr().err
+
+
+def test_a_lot_effect_is_in_the_report_of_a_diagnosed_fleet(factory, tmp_path, capsys):
+    told = lot("cross_field", 0.2, 14, 250, seed=1)
+    rows = [row(board_log(seed)[0]) | {"verdict": "adequate", "scores": text} for seed, text in enumerate(told)]
+    path = tmp_path / "diagnosed.parquet"
+    write_fleet(rows, settings_of("diagnose", MODEL), path)
+    assert cli.run(["fleet", "report", str(path), "--json", "-o", str(tmp_path / "page.html")]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["lots"]["lot1"]
+    assert found["effect"] == "cross_field"
+    assert "lot lot1 shares cross_field" in (tmp_path / "page.html").read_text()

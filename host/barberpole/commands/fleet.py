@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from barberpole.commands.console import AS_JSON, ERR, OUT, print_json
+from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, table
 from barberpole.errors import InputError, must
 
 FIRST = "fit"  # what `barberpole fleet 'logs/*.parquet' -o fleet.parquet` does
 BAD_INPUT = 2
-LISTED = 5  # failed logs, in words
+LISTED = 5  # of a kind, in words
 
 Patterns = Annotated[list[str], typer.Argument(help="Logs, folders, or globs in quotes: 'logs/*.parquet'.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="The table, one row a log (.parquet).")]
@@ -61,7 +61,7 @@ def register(app: typer.Typer) -> None:
         "`barberpole fleet 'logs/*.parquet' -o fleet.parquet [--do verify]` is short for `fleet fit ...`.",
         no_args_is_help=True,
     )
-    for command in (fit, verify, diagnose):
+    for command in (fit, verify, diagnose, report, common, extract):
         group.command()(command)
     app.add_typer(group, name="fleet")
 
@@ -110,6 +110,73 @@ def diagnose(
 ) -> int:
     """Diagnose every log, and keep what each effect would take of it: `fleet report` adds that up over the boards."""
     return _any(_run("diagnose", logs, output, model, None, sensor, name, processes, dask, as_json))
+
+
+def report(
+    fleet: Table,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Where to write the page (.html).")] = None,
+    lot: Lot = None,
+    as_json: bool = AS_JSON,
+) -> None:
+    """What the boards tell together: what they share, which stand out and why, which have changed."""
+    from barberpole.fleet.summary import summarise
+    from barberpole.fleet.table import of_lot, read_fleet
+    from barberpole.report.fleet import verdict, write_fleet_report
+
+    chosen = of_lot(read_fleet(fleet), lot)
+    found = summarise(chosen)
+    if output:
+        write_fleet_report(found, chosen, output)
+    if as_json:
+        print_json(found.to_json())
+        return
+    OUT.print(verdict(found), style="bold")
+    for one in found.outliers[:LISTED]:
+        OUT.print(f"{one.board}: {one.why}")
+    for one in found.changes[:LISTED]:
+        OUT.print(f"{one.board}: {one.why}")
+    for where, effects in found.lots.items():
+        for one in effects:
+            rivals = f"; cannot be told from {', '.join(one.rivals)}" if one.rivals else ""
+            OUT.print(f"lot {where}: {one.effect} {one.kind}, {one.size:.2g} of the noise{rivals}")
+    notes(found.notes)
+
+
+def common(fleet: Table, lot: Lot = None, as_json: bool = AS_JSON) -> None:
+    """Which parameters all boards share, and which are individual: scatter between boards against its uncertainty."""
+    from dataclasses import asdict
+
+    from barberpole.fleet.spread import spreads
+    from barberpole.fleet.table import of_lot, read_fleet
+
+    found = spreads(of_lot(read_fleet(fleet), lot).latest())
+    if as_json:
+        print_json({"parameters": {one.name: asdict(one) | {"kind": one.kind} for one in found}})
+        return
+    heads = ("parameter", "mean", "between", "own error", "unit", "off, LSB", "it is")
+    shown = table(f"{max(one.boards for one in found)} boards, noise {found[0].noise_lsb:.3g} LSB", *heads)
+    for one in found:
+        figures = (f"{one.mean:.4g}", f"{one.tau:.3g}", f"{one.stderr:.2g}", one.unit, f"{one.error_lsb:.3g}")
+        shown.add_row(one.name, *figures, one.kind)
+    OUT.print(shown)
+
+
+def extract(
+    fleet: Table,
+    board: Annotated[str, typer.Argument(help="Name of the board, as in the table.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where to write calibration.toml.")],
+    as_json: bool = AS_JSON,
+) -> None:
+    """One board's latest calibration as a calibration file, for `build` and `verify`."""
+    from barberpole.calibration import write_calibration
+    from barberpole.fleet.table import read_fleet
+
+    found = read_fleet(fleet).calibration(board)
+    write_calibration(found, output)
+    if as_json:
+        print_json({"output": str(output), "calibration": found.hash, "log": found.log_name})
+    else:
+        OUT.print(f"calibration {found.hash} of {board} written to {output}")
 
 
 def _any(rows: list[dict]) -> int:
