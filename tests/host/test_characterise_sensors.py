@@ -1,5 +1,7 @@
 """The article's three sensors as files: they load, simulate, and give their own table 1 back when characterised."""
 
+import json
+
 import numpy as np
 import pytest
 from barberpole.board import load_board, load_sensor
@@ -60,3 +62,11 @@ def test_refusals(tmp_path, capsys):
     with pytest.raises(InputError, match="within ±88"):
         readings(load_sensor("hmc5983"), np.full((3, 10), 100.0))
     assert command(["simulate", "hmc5983", "--program", "dance", "-o", str(tmp_path / "a.csv")]) == 2
+
+
+def test_a_turned_sensor_is_calibrated_by_the_ellipsoid(tmp_path, capsys):
+    path = tmp_path / "turned.csv"
+    assert command(["simulate", "hmc5983", "--program", "turned", "-o", str(path)]) == 0
+    capsys.readouterr()
+    assert command(["fit", str(path), "--method", "ellipsoid", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rms_norm_percent"] < 0.3  # the noise is 60 nT of 48 µT

@@ -99,7 +99,7 @@ def answer(folder: Path, given: tuple[str, ...]) -> Opened:
 
 
 def fall(folder: Path, opened: Opened) -> list[float]:
-    """Held-out error in LSB of the model as it was given, then with each hidden effect of the catalogue in it as well."""
+    """Held-out error in LSB of the model as it was given, then with each hidden effect of the catalogue in it too."""
     seen, file = observations(read_log(folder / LOG)), replace(read_model(folder / MODEL), effects=BASE)
     errors: list[float] = []
     for name in opened.taken:

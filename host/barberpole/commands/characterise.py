@@ -8,6 +8,7 @@ import typer
 
 from barberpole import __version__
 from barberpole.board import load_sensor
+from barberpole.challenge.motion import smooth
 from barberpole.characterise.sheet import Sheet, make_sheet
 from barberpole.characterise.simulate import readings
 from barberpole.columns import FIELD, READINGS
@@ -18,9 +19,10 @@ from barberpole.numbers import uncertain
 from barberpole.sensor import Sensor
 from barberpole.trajectory.programs import FREQUENCIES_HZ, SINE_PEAK_TO_PEAK_UT, lin_60000
 
-PROGRAMS = ("linearity", "rest", "sine")
+PROGRAMS = ("linearity", "rest", "sine", "turned")
 REPEATS = 25  # readings of each field of the linearity program
 REST_S, TONE_S = 300.0, 60.0  # article 2.4: five minutes of noise; long enough for the slowest sine
+TURNED, EARTH_UT = 3000, 48.0  # readings of a sensor turned through all directions, and the field it turns in
 
 
 def register(app: typer.Typer) -> None:
@@ -73,12 +75,12 @@ def _json(sheet: Sheet) -> dict:
 def simulate(
     sensor: Annotated[str, typer.Argument(help="Sensor name or .toml with a table sensor.digital.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Log to write (.csv or .parquet).")],
-    program: Annotated[str, typer.Option(help=f"One of {', '.join(PROGRAMS)} (article 2.4).")] = "linearity",
+    program: Annotated[str, typer.Option(help=f"One of {', '.join(PROGRAMS)}.")] = "linearity",
     temp: Annotated[float, typer.Option(help="Temperature in °C.")] = 25.0,
     seed: Annotated[int, typer.Option(help="Which sensor of the kind.")] = 0,
     as_json: bool = AS_JSON,
 ) -> None:
-    """A log as a digital sensor of this kind would write it under a field program of the article."""
+    """A log as a digital sensor of this kind would write it under a field program."""
     kind = load_sensor(sensor)
     log = _simulated(kind, program, temp, seed, output)
     write_log(log, output)
@@ -98,6 +100,8 @@ def _simulated(kind: Sensor, program: str, temp_c: float, seed: int, path: Path)
         extra = dict(zip(FIELD, field, strict=True))
     elif program == "rest":
         field = np.zeros((3, round(REST_S * rate_hz)))
+    elif program == "turned":
+        field = EARTH_UT * smooth(TURNED, np.random.default_rng(seed))
     else:
         t = np.arange(round(TONE_S * rate_hz)) / rate_hz
         half = 0.5 * SINE_PEAK_TO_PEAK_UT / np.sqrt(3.0)  # the sensor is slanted: all axes see the same
