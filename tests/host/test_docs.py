@@ -59,8 +59,13 @@ class Shell:
         self.printed += said.out
 
     def start(self, words: list[str]) -> None:
+        quiet = ["--no-browser"] if words[0] == "workbench" else []
         child = subprocess.Popen(
-            [sys.executable, "-m", "barberpole", *words], stdout=subprocess.PIPE, text=True, start_new_session=True
+            [sys.executable, "-m", "barberpole", *words, *quiet],
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={name: value for name, value in os.environ.items() if not name.startswith("PYTEST")},
         )
         self.beside.append(child)
         assert child.stdout is not None
