@@ -117,3 +117,15 @@ def test_a_strong_saturation_shows_through_heavy_noise():
     fit = fit_log(log, model_of((*BASE, "saturation")))
     assert fit.rms_lsb < 1.02 * 20.0 * 1.08  # the gains of that sensor are up to 8 % above the ten of the recipe
     assert all(value > 0 for name, value in zip(fit.model.names, fit.p, strict=True) if "saturation" in name)
+
+
+@pytest.mark.parametrize("reference", ["vector", "magnitude", "constant"])
+def test_a_bridge_offset_many_times_the_field_is_no_obstacle(reference):
+    """It alternates with the flips: in readings of raw polarity a scalar log lies on two ellipsoids."""
+    columns = record(Recipe({}, form="pairs", reference=reference, seed=77))
+    for axis, offset in zip("xyz", (30_000.0, -12_000.0, 25_000.0), strict=True):
+        columns[f"{axis}_set_lsb"] += offset
+        columns[f"{axis}_reset_lsb"] += offset
+    fit = fit_log(log_of(columns), model_of(BASE))
+    assert fit.rms_lsb == pytest.approx(2.0, rel=0.12)  # the noise, through gains of up to 15 %
+    assert fit.p[fit.model.names.index("bias.bridge_y")] == pytest.approx(-12_000.0, abs=1.0)

@@ -1,6 +1,6 @@
 """Where a fit starts: the linear part in closed form, everything else at its null (or `start`)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,11 +15,15 @@ TRIMS = 8
 
 @dataclass(frozen=True)
 class Linear:
-    """reading = matrix @ field + offset: (3, 3) in LSB/µT, (3,) in LSB, and the largest field component seen in µT."""
+    """reading = matrix @ field + offset: (3, 3) in LSB/µT, (3,) in LSB, and the largest field component seen in µT.
+
+    bridge (3,) in LSB is what SET readings have more, and RESET readings less, in logs of raw polarity.
+    """
 
     matrix: np.ndarray
     offset: np.ndarray
     span_ut: float
+    bridge: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def lsb_per_ut(self) -> float:
@@ -32,8 +36,20 @@ def linear_part(seen: Observations, magnitude_ut: float) -> Linear:
     if seen.b_ut is not None:
         return _against_field(seen.y, seen.b_ut)
     known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude_ut
-    shape = trimmed(seen.y, known)
-    return Linear(np.linalg.inv(shape.upper), shape.centre, known)
+    bridge = _bridge(seen)
+    shape = trimmed(seen.y - seen.at.state * bridge[:, None], known)
+    return Linear(np.linalg.inv(shape.upper), shape.centre, known, bridge)
+
+
+def _bridge(seen: Observations) -> np.ndarray:
+    """(3,) LSB: half of what SET readings have over RESET readings on average, the fields of both being alike.
+
+    A bridge's own offset may be many times the field: with it in the readings they lie on two ellipsoids.
+    """
+    state = np.broadcast_to(np.asarray(seen.at.state, float), seen.y.shape[1:])
+    if not (seen.raw_polarity and np.any(state > 0) and np.any(state < 0)):
+        return np.zeros(3)
+    return 0.5 * (np.median(seen.y[:, state > 0], axis=1) - np.median(seen.y[:, state < 0], axis=1))
 
 
 def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
@@ -64,6 +80,7 @@ def start_values(model: Model, linear: Linear) -> np.ndarray:
     aligned = "misalignment" in model.effects
     own = np.diag(linear.matrix)
     values = {f"bias.{a}": linear.offset[i] for i, a in enumerate("xyz")}
+    values |= {f"bias.bridge_{a}": linear.bridge[i] for i, a in enumerate("xyz")}
     for i, a in enumerate("xyz"):
         values[f"scale.{a}"] = sign[i] * gain[i] if aligned else own[i]
         for j, b in enumerate("xyz"):
