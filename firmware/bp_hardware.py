@@ -24,11 +24,11 @@ class Hardware:
 
 
 def _timed():  # flips and samples by timers, the on-chip converter
-    from bp_timed import TimedSampler
+    from bp_timed import make
     from bp_timers import Pulses
 
     pulses = Pulses(board)
-    sampler = TimedSampler(pulses, board)
+    sampler = make(pulses, board)
     return pulses, sampler, sampler.start, sampler.stop
 
 

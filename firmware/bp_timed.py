@@ -21,15 +21,20 @@ _RESTARTS = const(3)  # in a row, without one whole cycle between them
 _SLEEP_US = const(200)  # longest sleep at a time while a cycle is awaited
 
 
+def make(pulses, board):
+    plan = bp_timers.plan_for(board, board.RATE_HZ)
+    scan = Scan(board.ADC_PINS, board.ADC_CHANNELS, 2 * plan.scans * INPUTS * board.RING_CYCLES)
+    return TimedSampler(pulses, scan, plan, board)
+
+
 class TimedSampler:
-    def __init__(self, pulses, board):
+    def __init__(self, pulses, scan, plan, board):
         self._pulses = pulses
+        self._scan = scan
+        self._plan = plan
         self._board = board
         self.samples = board.SAMPLES_PER_HALF
-        self._plan = bp_timers.plan_for(board, board.RATE_HZ)
-        cycle = 2 * self._plan.scans * INPUTS
-        self._scan = Scan(board.ADC_PINS, board.ADC_CHANNELS, cycle * board.RING_CYCLES)
-        self._ring = Ring(self._scan.position)
+        self._ring = Ring(scan.position)
         self._running = False
         self.sums = array("i", bytearray(4 * _SUMS))
         self._one = array("i", bytearray(4 * _SUMS))  # of the cycle that is being read

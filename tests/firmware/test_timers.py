@@ -50,7 +50,7 @@ class Bench:
         self.modules = load(self.mcu, PINS, "bp_timers", "bp_scan", "bp_ring", "bp_timed", "bp_reasons")
         self.board = constants(rate_hz, **changed)
         self.pulses = self.modules.bp_timers.Pulses(self.board)
-        self.sampler = self.modules.bp_timed.TimedSampler(self.pulses, self.board)
+        self.sampler = self.modules.bp_timed.make(self.pulses, self.board)
         self.mcu.converter.source = self.codes
         self.seen = 0
 

@@ -5,6 +5,6 @@
 """
 
 from registers.mcu import UNITS_PER_US, Mcu
-from registers.modules import load
+from registers.modules import importable, load
 
-__all__ = ["UNITS_PER_US", "Mcu", "load"]
+__all__ = ["UNITS_PER_US", "Mcu", "importable", "load"]

@@ -7,23 +7,29 @@ from types import ModuleType, SimpleNamespace
 
 from barberpole import paths
 
-from registers.addresses import TIM, TIM2, TIM8, stm_names
+from registers.addresses import TIM, TIM2, TIM4, TIM8, stm_names
 from registers.mcu import ALTERNATE, ANALOG, OUTPUT, UNITS_PER_US, Mcu
 
 PERIOD = 1 << 30
 CALL_UNITS = 170
 SRAM = 0x2000_4000
-TIMERS = {2: TIM2, 8: TIM8}
-SOURCE_HZ = {2: 84_000_000, 8: 168_000_000}
+TIMERS = {2: TIM2, 4: TIM4, 8: TIM8}
+SOURCE_HZ = {2: 84_000_000, 4: 84_000_000, 8: 168_000_000}
 
 
 def load(mcu: Mcu, pins: dict[str, str], *names: str) -> SimpleNamespace:
     """Firmware modules by name, talking to `mcu`; `pins` maps board names to port pins."""
-    found = {}
     with _installed(_fakes(mcu, pins)):
-        for name in names:
-            found[name] = __import__(name)
-    return SimpleNamespace(**found)
+        return SimpleNamespace(**{name: __import__(name) for name in names})
+
+
+@contextmanager
+def importable(mcu: Mcu, pins: dict[str, str], generated: dict[str, ModuleType], spi: type) -> Iterator[None]:
+    """Firmware can be imported meanwhile, also by itself; `generated` modules by name, `spi` is machine.SPI."""
+    fakes = _fakes(mcu, pins)
+    fakes["machine"].__dict__["SPI"] = spi
+    with _installed(fakes | generated):
+        yield
 
 
 @contextmanager
@@ -131,6 +137,7 @@ def _pin_class(mcu: Mcu, pins: dict[str, str]) -> type:
 def _timer_class(mcu: Mcu) -> type:
     class Timer:  # as timer.c leaves the registers: running, updated once, outputs of a soft reset unknown
         UP, CENTER = 0, 32
+        PWM = 0
 
         def __init__(self, number: int, *, prescaler: int | None = None, period: int = 0, mode: int = 0):
             self._number = number
@@ -139,6 +146,12 @@ def _timer_class(mcu: Mcu) -> type:
                 mcu.write(at + TIM["CR1"], 0)
                 for name, value in (("PSC", prescaler), ("ARR", period), ("EGR", 1), ("CR1", mode | 0x81)):
                     mcu.write(at + TIM[name], value)
+
+        def channel(self, number: int, mode: int, *, pulse_width: int) -> None:
+            at = TIMERS[self._number]
+            mcu.write(at + TIM["CCMR1" if number < 3 else "CCMR2"], 0x68 << 8 * (number - 1 & 1))
+            mcu.write(at + TIM[f"CCR{number}"], pulse_width)
+            mcu.write(at + TIM["CCER"], 1 << 4 * (number - 1))
 
         def source_freq(self) -> int:
             return SOURCE_HZ[self._number]
