@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from barberpole.board_tables import Board
+from barberpole.bring_up import bring_up
 from barberpole.driver_board import Driver
 from barberpole.files import write_atomic
 from barberpole.sensor import Sensor
@@ -31,6 +32,7 @@ def write_docs(folder: Path) -> None:
     """Write all pages into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     write_atomic(folder / "boards.md", board_reference())
+    write_atomic(folder / "bring-up.md", bring_up())
 
 
 def _tables(name: str, kind: type) -> list[tuple[str, type]]:
