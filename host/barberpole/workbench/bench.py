@@ -25,8 +25,13 @@ class Bench:
     @property
     def key(self) -> str:
         """Tells two benches apart, also where a plugin was edited in between."""
-        plugins = [(p, hashlib.sha256(Path(p).read_bytes()).hexdigest()) for p in self.file.plugins if Path(p).exists()]
-        return short_hash([str(self.log), self.file.hash, plugins, self.excluded])
+        return short_hash([str(self.log), self.file.hash, self.plugins_key, self.excluded])
+
+    @property
+    def plugins_key(self) -> str:
+        """Tells apart which own effects there are, by what their files say."""
+        there = [Path(plugin) for plugin in self.file.plugins if Path(plugin).exists()]
+        return short_hash([(str(path), hashlib.sha256(path.read_bytes()).hexdigest()) for path in there])
 
     @property
     def rows_key(self) -> str:

@@ -78,7 +78,7 @@ class Lab:
 
     def __init__(self) -> None:
         self._logs, self._seen = Kept(KEPT_LARGE), Kept(KEPT_LARGE)
-        self._fits, self._traces = Kept(KEPT), Kept(KEPT_LARGE)
+        self._fits, self._traces, self._own = Kept(KEPT), Kept(KEPT_LARGE), Kept(KEPT)
         self.tick: Tick | None = None
         self.drawn: dict[str, Picture] = {}
 
@@ -104,8 +104,8 @@ class Lab:
         return self._seen.get_or(bench.rows_key, make)
 
     def extra(self, bench: Bench) -> tuple[Effect, ...]:
-        """The user's own effects."""
-        return load_plugins(bench.file.plugins)
+        """The user's own effects, loaded again where a file has changed."""
+        return self._own.get_or(bench.plugins_key, lambda: load_plugins(bench.file.plugins))
 
     def open(self, bench: Bench) -> Opened:
         """Read the log and say what it is."""

@@ -10,10 +10,12 @@ def _variables(ground: Ground, accent: str, good: str, bad: str) -> str:
     )
 
 
+ACCENT = {False: BLUE, True: "#6cb6e8"}  # by whether the ground is dark
+
 # on dark ground the hues are lightened until letters in them keep 4.5:1
 CSS = f"""
-:root {{ {_variables(LIGHT_GROUND, BLUE, "#00704f", "#b34700")} --bar:{VERMILLION}; --floor:{GREEN}; }}
-body.body--dark {{ {_variables(DARK_GROUND, "#6cb6e8", "#3fc79a", "#f0934e")} }}
+:root {{ {_variables(LIGHT_GROUND, ACCENT[False], "#00704f", "#b34700")} --bar:{VERMILLION}; --floor:{GREEN}; }}
+body.body--dark {{ {_variables(DARK_GROUND, ACCENT[True], "#3fc79a", "#f0934e")} }}
 body {{ font-family:{FONT}; background:var(--paper); color:var(--ink); font-size:14px; line-height:1.4; }}
 """
 
@@ -69,6 +71,9 @@ RULES = """
 .bp-step[aria-current=step] { background:var(--raised); font-weight:620; }
 .bp-step.off { color:var(--quiet); }
 .bp-step span:last-child { margin-left:auto; font-variant-numeric:tabular-nums; }
+.bp-live { display:grid; grid-template-columns:minmax(0,1fr) 400px; align-items:start; }
+.bp-live > section { border-right:1px solid var(--grid); }
+.bp-title { font-size:18px; font-weight:640; margin:0; line-height:1.3; }
 .bp-busy { position:fixed; left:0; right:0; bottom:0; height:34px; display:flex; align-items:center; gap:10px;
   padding:0 16px; background:var(--raised); border-top:1px solid var(--grid); font-size:13px; z-index:30; }
 .bp-brush { display:flex; align-items:center; gap:8px; height:34px; font-size:13px; }
@@ -87,10 +92,10 @@ RULES = """
 .bp-tab { border:0; background:none; color:var(--quiet); padding:6px 4px; cursor:pointer; font-size:14px;
   border-bottom:2px solid transparent; }
 .bp-tab[aria-selected=true] { color:var(--ink); border-color:var(--accent); font-weight:600; }
-.q-btn.text-primary { color:var(--accent) !important; }
 .q-btn { text-transform:none; letter-spacing:0; }
 .q-dialog__inner > .q-card, .q-menu { background:var(--paper); color:var(--ink); }
 .bp-error { color:var(--bad); white-space:pre-wrap; min-height:40px; font-size:13.5px; }
+.bp-wrong { background:color-mix(in srgb, var(--bad) 22%, transparent); }
 .bp-par { font-size:12.5px; width:100%; border-collapse:collapse; font-variant-numeric:tabular-nums; }
 .bp-par td, .bp-par th { padding:2px 6px 2px 0; text-align:right; font-weight:400;
   border-bottom:1px solid var(--grid); }

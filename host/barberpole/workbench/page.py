@@ -11,13 +11,18 @@ from barberpole.errors import BarberpoleError
 from barberpole.figures.theme import BLUE
 from barberpole.modelfile import read_model
 from barberpole.workbench import look
+from barberpole.workbench.page_editor import Editor
+from barberpole.workbench.page_keep import Keep
+from barberpole.workbench.page_live import Live, show_ports
 from barberpole.workbench.page_pictures import Pictures
+from barberpole.workbench.page_rivals import Rivals
 from barberpole.workbench.page_side import show_history, show_parameters, show_stack
 from barberpole.workbench.page_start import show_start
 from barberpole.workbench.page_suspects import show_suspects
 from barberpole.workbench.page_trial import Trial, show_answer
 from barberpole.workbench.page_verdict import Verdict
 from barberpole.workbench.session import Session
+from barberpole.workbench.watch import Watch
 from barberpole.workbench.widgets import complain, press, text_of
 
 
@@ -28,10 +33,11 @@ def build(folder: Path, log: Path | None = None) -> None:
     async def window() -> None:
         ui.add_head_html(f"<style>{look.CSS}{look.RULES}</style>")
         page = Page(Session(folder))
-        page.client.on_delete(page.session.close)
+        page.client.on_delete(page.close)
         page.lay_out()
         await page.client.connected(timeout=20.0)
         page.dark = bool(await ui.run_javascript("matchMedia('(prefers-color-scheme: dark)').matches"))
+        page.colours()
         if log is not None:
             await page.open(log)
 
@@ -43,6 +49,7 @@ class Page:
     session: Session
     dark: bool = False
     trial: Trial | None = None
+    watched: Watch | None = None
     parts: dict[str, list] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -52,11 +59,12 @@ class Page:
 
     def colours(self) -> None:
         """The palette of the pictures for buttons and switches."""
-        ui.colors(primary=BLUE, negative="#b34700", positive="#00704f")
+        ui.colors(primary=BLUE, accent=look.ACCENT[self.dark], negative="#b34700", positive="#00704f")
 
     def lay_out(self) -> None:
         """Everything that is always there."""
         self.colours()
+        self.editor, self.keep, self.rivals = Editor(self), Keep(self), Rivals(self)
         self._header()
         self.body = ui.element("div").style("width:100%")
         self._busy()
@@ -70,13 +78,18 @@ class Page:
             self.tools = ui.row().classes("items-center gap-1 no-wrap")
             with self.tools:
                 self._tool("Open", "folder_open", self.show_start, "Open another log or trial")
+                self.bench_tools = ui.row().classes("items-center gap-1 no-wrap")
+            with self.tools, self.bench_tools:
+                self._tool("Save", "save", self.keep.open, "Model, calibration, report, firmware")
                 self._tool("Undo", "undo", lambda: self.session.walk(lambda h: h.undo()), "Undo (z)")
                 self._tool("Redo", "redo", lambda: self.session.walk(lambda h: h.redo()), "Redo (y)")
             self.tools.set_visibility(False)
-            ui.button(icon="contrast", on_click=self.turn).props('flat round dense aria-label="Light or dark"')
+            ui.button(icon="contrast", on_click=self.turn).props(
+                'flat round dense color=accent aria-label="Light or dark"'
+            )
 
     def _tool(self, text: str, icon: str, handler, hint: str) -> None:
-        ui.button(text, icon=icon, on_click=handler).props("flat dense no-caps size=13px").tooltip(hint)
+        ui.button(text, icon=icon, on_click=handler).props("flat dense no-caps size=13px color=accent").tooltip(hint)
 
     def _busy(self) -> None:
         self.busy = ui.element("div").classes("bp-busy").props("role=status aria-live=polite")
@@ -90,6 +103,7 @@ class Page:
         """Light to dark and back."""
         self.dark = not self.dark
         self.theme.value = self.dark
+        self.colours()
         self.changed("ground")
 
     async def _key(self, event) -> None:
@@ -101,13 +115,14 @@ class Page:
 
     def show_start(self) -> None:
         """The first screen."""
+        self.unwatch()
         self.body.clear()
         self.parts.clear()
         self.tools.set_visibility(False)
         self.log_name.text = ""
         uploads = Path(self.session.own.name)
         with self.body:
-            show_start(self.session.folder, uploads, self.open, self.play)
+            show_start(self.session.folder, uploads, self.open, self.play, lambda: show_ports(self))
 
     async def open(self, path: Path) -> None:
         """Put a log on the bench."""
@@ -127,6 +142,40 @@ class Page:
             self.trial = Trial(folder, level, chosen.text)
             rest = folder / game.REST
             await self.session.open(folder / game.LOG, read_model(folder / game.MODEL), rest if rest.exists() else None)
+
+    async def watch(self, port: str) -> None:
+        """Watch the board at a port."""
+        self.unwatch()
+        watch = Watch(port)
+        try:
+            watch.start()
+        except BarberpoleError as error:
+            complain(str(error))
+            return
+        self.watched = watch
+        self.log_name.text = f"Live: {port}"
+        self.tools.set_visibility(True)
+        self.bench_tools.set_visibility(False)
+        self.body.clear()
+        self.parts.clear()
+        with self.body:
+            Live(self, watch)
+
+    def unwatch(self) -> None:
+        """The board goes on without being watched."""
+        watched, self.watched = self.watched, None
+        if watched:
+            watched.close()
+
+    async def recorded(self, name: str) -> None:
+        """A recording is whole: put it on the bench."""
+        self.unwatch()
+        await self.open(self.session.folder / name)
+
+    def close(self) -> None:
+        """The window is gone."""
+        self.unwatch()
+        self.session.close()
 
     def changed(self, part: str) -> None:
         """A part of the session has changed: show it."""
@@ -151,6 +200,7 @@ class Page:
         what = f"Trial, level {self.trial.level}" if self.trial else opened.name
         self.log_name.text = f"{what}  ·  {opened.rows:,} rows  ·  {known[opened.reference]}".replace(",", "\u2009")
         self.tools.set_visibility(True)
+        self.bench_tools.set_visibility(True)
         self.body.clear()
         self.parts.clear()
         with self.body:
@@ -168,6 +218,7 @@ class Page:
             self.stack()
             self.history = ui.refreshable(lambda: show_history(self))
             self.history()
+            press("Compare two models", "bp-chip", self.rivals.open).style("margin:8px 0")
             self.parameters = ui.refreshable(lambda: show_parameters(self))
             self.parameters()
 
@@ -177,6 +228,7 @@ class Page:
                 show_answer(self)
             self.suspects = ui.refreshable(lambda: show_suspects(self))
             self.suspects()
+            press("Write an effect of your own", "bp-chip", self.editor.open).style("margin-top:14px")
 
     def _listen(self, verdict: Verdict, pictures: Pictures) -> None:
         again = [lambda p=part: p.refresh() for part in (self.stack, self.history, self.parameters, self.suspects)]

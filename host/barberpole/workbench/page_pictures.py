@@ -73,7 +73,7 @@ class Pictures:
             self._row.clear()
             with self._row:
                 self._buttons = {
-                    name: press(name.replace("_", " "), "bp-chip", lambda n=name: self.look_at(n), title=title)
+                    name: press(_chip(title), "bp-chip", lambda n=name: self.look_at(n), title=title)
                     for name, title in known.items()
                 }
         for name, button in self._buttons.items():
@@ -146,6 +146,11 @@ class Pictures:
         self._box = None
         self._hint.text = "Draw a box in a picture to choose rows."
         self._tools.set_visibility(False)
+
+
+def _chip(title: str) -> str:
+    """The axis title without its unit."""
+    return title.split(",")[0].removeprefix("the ")
 
 
 def box_of(name: str, found: dict, against: str) -> Box | None:

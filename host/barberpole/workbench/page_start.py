@@ -18,8 +18,8 @@ Open = Callable[[Path], Awaitable[None]]
 Play = Callable[[int], Awaitable[None]]
 
 
-def show_start(folder: Path, uploads: Path, open_log: Open, play: Play) -> None:
-    """The first screen."""
+def show_start(folder: Path, uploads: Path, open_log: Open, play: Play, live: Callable[[], None]) -> None:
+    """The first screen. `live` shows what a board is watched from."""
     with ui.element("main").classes("bp-start"):
         ui.html("<h1>Hold a model against a measurement</h1>", sanitize=False)
         about = "See where it fails, learn which physical effect is missing, add it, and watch the error fall."
@@ -32,9 +32,11 @@ def show_start(folder: Path, uploads: Path, open_log: Open, play: Play) -> None:
                     text_of(about.text, classes="bp-small")
         _heading("Or bring a log: CSV, Parquet, or a board's records (.bpr)")
         _drop(uploads, open_log)
+        _heading("Or watch a board")
+        live()
         files = logs_in(folder)
         if files:
-            _heading(f"Or open one from {folder}")
+            _heading(f"Logs in {folder}")
             with ui.element("div").classes("bp-chips"):
                 for name in files:
                     press(name, "bp-chip", lambda n=name: open_log(below(folder, n, "the log")))

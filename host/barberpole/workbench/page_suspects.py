@@ -44,7 +44,7 @@ def _card(page: "Page", suspect: Suspect) -> None:
             )
             button.style("padding:2px 14px")
             if not suspect.named:
-                button.props("outline")
+                button.props("outline color=accent")
         text_of(suspect.equation, "div", "bp-eq")
         text_of(suspect.summary, "div", "bp-small")
         with ui.element("div").classes("bp-meter").props(f'role=img aria-label="explains {suspect.explains:.0%}"'):

@@ -59,7 +59,9 @@ def _body(page: "Page", trial: Trial, answer: Callable[[tuple[str, ...]], None])
     with ui.row().classes("gap-2").style("margin-top:6px"):
         mine = ui.button("Answer with my model", on_click=lambda: answer(given(page)))
         mine.props("dense unelevated no-caps color=primary")
-        ui.button("Something unknown", on_click=lambda: answer((game.UNKNOWN,))).props("dense outline no-caps")
+        ui.button("Something unknown", on_click=lambda: answer((game.UNKNOWN,))).props(
+            "dense outline no-caps color=accent"
+        )
 
 
 def _truth(opened: game.Opened) -> None:

@@ -13,12 +13,16 @@ from pathlib import Path
 from barberpole.errors import BarberpoleError, InputError, must
 from barberpole.modelfile import ModelFile
 from barberpole.workbench.bench import START, Bench
-from barberpole.workbench.history import History
+from barberpole.workbench.guard import below
+from barberpole.workbench.history import History, Step
 from barberpole.workbench.lab import Opened, Summary, without_effect
+from barberpole.workbench.own import Tried, with_plugin
 from barberpole.workbench.pictures import Box, Chosen, Picture, View
+from barberpole.workbench.rivals import Comparison
 from barberpole.workbench.suspects import Suspect, Suspicion
 from barberpole.workbench.worker import Stopped, Worker
 
+TRIAL_S = 20.0  # for a user's own effect to show that it keeps its contract
 PATIENCE_S = 1.0  # an overtaken diagnosis that has run longer than this is stopped; a shorter one soon ends by itself
 
 Change = Callable[[str], None]
@@ -41,6 +45,7 @@ class Session:
     thinking: bool = False
     message: str = ""
     progress: int = 0
+    written: set[Path] = field(default_factory=set)
     own: tempfile.TemporaryDirectory = field(
         default_factory=lambda: tempfile.TemporaryDirectory(prefix="barberpole-workbench-")
     )
@@ -189,6 +194,60 @@ class Session:
     async def select(self, box: Box) -> Chosen | None:
         """Samples within a box."""
         return await self._try("selecting", self.hands.ask("select", self.bench, box))
+
+    async def write_effect(self, name: str, text: str) -> tuple[Tried | None, str]:
+        """Try a user's own effect and, where it keeps its contract, let it join the suspects; or say what is wrong.
+
+        The file appears in the folder. One that was there before this window wrote it is not touched.
+        """
+        try:
+            path = below(self.folder, f"{name}.py", "the file of the effect")
+            if path.exists() and path not in self.written:
+                raise InputError(must("the name of the effect", "that of a file not there yet", path.name))
+            tried = await asyncio.wait_for(self.mind.ask("try_effect", path, text), TRIAL_S)
+        except TimeoutError:
+            self.mind.stop()
+            return None, f"forward must end within {TRIAL_S:g} s; it was stopped"
+        except BarberpoleError as error:
+            return None, str(error)
+        self.written.add(path)
+        self._judged = {}  # it may explain what was called unexplained
+        await self.do(f"wrote {name}", with_plugin(self.bench, path))
+        self.opened = await self.hands.ask("open_log", self.bench)
+        self.on_change("history")
+        return tried, ""
+
+    async def keep(self, task: str, name: str, *arguments) -> str:
+        """Write a model, a calibration or a report into the folder; the path written, or '' with a message."""
+        try:
+            path = below(self.folder, name)
+        except InputError as error:
+            self.message = str(error)
+            self.on_change("message")
+            return ""
+        done = await self._try(f"writing {name}", self.mind.ask(task, self.bench, path, *arguments))
+        return "" if done is None else str(path)
+
+    async def build(self, board: str, name: str) -> dict | None:
+        """Build the firmware for a board into a folder below the folder; its budget."""
+        try:
+            folder = below(self.folder, name, "the folder of the build")
+        except InputError as error:
+            self.message = str(error)
+            self.on_change("message")
+            return None
+        work = self.mind.ask("build_firmware", self.bench, board, folder, self.attempts)
+        return await self._try("building the firmware", work)
+
+    @property
+    def attempts(self) -> list[Step]:
+        """The steps that led here."""
+        return [self.path.steps[at] for at in self.path.trail()]
+
+    async def compare(self, other: int) -> Comparison | None:
+        """The model on the bench against that of another step, on held-out stretches."""
+        there = replace(self.path.steps[other].bench, excluded=self.bench.excluded)
+        return await self._try("comparing", self.hands.ask("rivals", self.bench, there))
 
     def cancel(self) -> None:
         """Stop whatever is being computed."""

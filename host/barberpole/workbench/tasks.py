@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from barberpole.workbench.bench import Bench
+from barberpole.workbench.keeping import build_firmware, save_calibration, save_model, save_report
 from barberpole.workbench.lab import Lab, Opened, Summary
+from barberpole.workbench.own import try_effect
 from barberpole.workbench.pictures import Box, Chosen, Picture, View, choose, draw
+from barberpole.workbench.rivals import rivals
 from barberpole.workbench.suspects import Suspicion, suspicion
 from barberpole.workbench.traces import inside
 
@@ -58,6 +61,6 @@ def with_effect(lab: Lab, bench: Bench, effect: str, settings: dict | None) -> B
     return lab.with_effect(bench, effect, settings)
 
 
-TASKS: dict[str, Callable[..., Any]] = {
-    task.__name__: task for task in (open_log, summary, abscissae, picture, select, exclude, suspects, with_effect)
-}
+BENCH = (open_log, summary, abscissae, picture, select, exclude, suspects, with_effect, rivals, try_effect)
+KEEP = (save_model, save_calibration, save_report, build_firmware)
+TASKS: dict[str, Callable[..., Any]] = {task.__name__: task for task in (*BENCH, *KEEP)}

@@ -1,0 +1,57 @@
+"""Two models side by side, on stretches of the log that neither was fitted to."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from barberpole.fit.gram import FOLDS, Gram, solve_scaled
+from barberpole.workbench.bench import Bench
+from barberpole.workbench.lab import Lab
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Held-out errors in LSB by fold (FOLDS,) of one model and the other; sigmas: of their mean paired difference."""
+
+    one: tuple[float, ...]
+    other: tuple[float, ...]
+    sigmas: float
+
+    @property
+    def sentence(self) -> str:
+        """Which is better, and whether that is sure."""
+        a, b = (float(np.sqrt(np.mean(np.square(v)))) for v in (self.one, self.other))
+        better = "the first" if a < b else "the second"
+        said = f"{a:.4g} against {b:.4g} LSB on held-out stretches"
+        if not abs(self.sigmas) > SURE:
+            return f"{said}: no sure difference ({abs(self.sigmas):.2g} standard errors)"
+        return f"{said}: {better} is better, by {abs(self.sigmas):.2g} standard errors"
+
+
+SURE = 2.0
+
+
+def rivals(lab: Lab, one: Bench, other: Bench) -> Comparison:
+    """Compare two benches of the same rows."""
+    a, b = (np.array(_by_fold(lab, bench)) for bench in (one, other))
+    difference = a**2 - b**2
+    error = float(np.std(difference, ddof=1) / np.sqrt(FOLDS))
+    return Comparison(tuple(a.tolist()), tuple(b.tolist()), float(np.mean(difference)) / max(error, 1e-300))
+
+
+def _by_fold(lab: Lab, bench: Bench) -> list[float]:
+    """RMS of each fold under the parameters fitted to the others, as `heldout_rms` takes them together."""
+    fit = lab.fit(bench)
+    gram: Gram = fit.gram.take(np.flatnonzero(fit.free))
+    total, errors = gram.jj.sum(axis=0), []
+    for fold in range(FOLDS):
+        out = [fold, fold + FOLDS]
+        h, g = gram.jj[out].sum(axis=0), gram.jr[out].sum(axis=0)
+        try:
+            shift = solve_scaled(total - h, -g)
+        except np.linalg.LinAlgError:
+            errors.append(float("inf"))
+            continue
+        left = gram.rr[out].sum() - 2.0 * shift @ g + shift @ h @ shift
+        errors.append(float(np.sqrt(max(left, 0.0) / gram.m[out].sum())))
+    return errors
