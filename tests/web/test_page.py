@@ -4,6 +4,10 @@ import http.client
 import re
 from urllib.parse import urlsplit
 
+import pytest
+from barberpole.calibration import read_calibration
+from barberpole.modelfile import read_model
+
 
 def figure(page, test):
     """The first number in an element."""
@@ -102,3 +106,99 @@ def test_other_hosts_and_origins_are_refused(server):
     assert status("GET", path, Origin=server.rstrip("/"), **upgrade) in (101, 400)
     for path in ("/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/_nicegui/../../../etc/passwd"):
         assert status("GET", path) in (400, 403, 404)
+
+
+PICTURES_WITH_A_CHOICE = """
+Array.from(document.querySelectorAll('.js-plotly-plot'))
+    .filter(e => (e.data || []).some(t => t.selectedpoints && t.selectedpoints.length)).length
+"""
+
+BEND = """
+import numpy as np
+from barberpole.effects.effect import per_axis
+
+EQUATION = "y_i = x_i (1 + c_i x_e^2)"
+
+
+def params(setup):
+    return per_axis("1/uT^2", typical=0.005 / setup.span_ut**2)
+
+
+def forward(xyz, p, at):
+    x, y, z = xyz
+    return x * (1 + p[0] * y * y), y * (1 + p[1] * x * x), z * (1 + p[2] * y * y)
+"""
+
+
+def write(page, text):
+    page.locator(".cm-content").fill(text)
+    page.click("button:has-text('Try it')")
+
+
+def test_an_effect_of_ones_own_is_refused_with_its_line_and_joins_once_it_is_right(window, crossed, folder, shots):
+    open_log(window, crossed)
+    window.click("text=Write an effect of your own")
+    window.fill("input[aria-label*='Name']", "my_bend")
+    write(window, BEND.replace("x * (1 + p[0] * y * y)", "x * (1 + p[0] * why)"))
+    window.wait_for_selector("[data-test=effect-error]:has-text(\"name 'why' is not defined\")")
+    assert "line 14" in window.text_content("[data-test=effect-error]")
+    assert window.locator(".bp-wrong").count() == 1
+    assert not (folder / "my_bend.py").exists()
+    window.screenshot(path=shots / "editor.png")
+    write(window, BEND.replace("1 + p[0]", "2 + p[0]"))
+    window.wait_for_selector("[data-test=effect-error]:has-text('identity while all parameters are at null')")
+    write(window, BEND)
+    window.wait_for_selector(".bp-eff:has-text('my_bend')")
+    assert (folder / "my_bend.py").read_text().strip() == BEND.strip()
+    window.wait_for_selector(".bp-card:has-text('my_bend')")
+    window.click("button[aria-label='Add my_bend']")
+    window.wait_for_selector("[aria-current=step]:has-text('+ my_bend')")
+
+
+def test_what_was_found_is_kept(window, crossed, folder):
+    open_log(window, crossed)
+    named(window, "cross_field")
+    window.click("button[aria-label='Add cross_field']")
+    window.wait_for_selector(".bp-fall.floor")
+    window.click("button:has-text('Save')")
+    window.click("button[aria-label='Save model']")
+    window.wait_for_selector("[data-test=kept]:has-text('model.toml written')")
+    assert "cross_field" in read_model(folder / "model.toml").effects
+    window.click("button[aria-label='Save calibration']")
+    window.wait_for_selector("[data-test=kept]:has-text('calibration.toml written')")
+    saved = read_calibration(folder / "calibration.toml")
+    assert [step.added for step in saved.history] == [None, "cross_field"]
+    assert saved.residual.heldout_rms_lsb == pytest.approx(figure(window, "heldout"), rel=1e-3)
+    window.fill("input[aria-label=Model]", "../outside.toml")
+    window.click("button[aria-label='Save model']")
+    window.wait_for_selector(".q-notification:has-text('must be within')")
+    assert not (folder.parent / "outside.toml").exists()
+
+
+def test_two_models_are_compared_on_held_out_data(window, crossed):
+    open_log(window, crossed)
+    named(window, "cross_field")
+    window.click("button[aria-label='Add cross_field']")
+    window.wait_for_selector(".bp-fall.floor")
+    window.click("text=Compare two models")
+    window.wait_for_selector("[data-test=rivals]:has-text('the first is better')")
+
+
+def test_a_box_in_one_picture_shows_in_all_and_its_rows_can_be_left_out(window, crossed):
+    open_log(window, crossed)
+    named(window, "cross_field")
+    window.wait_for_selector("[data-test=figure-residual] .nsewdrag")
+    box = window.locator("[data-test=figure-residual] .nsewdrag").first.bounding_box()
+    left, top = box["x"] + 0.2 * box["width"], box["y"] + 2
+    window.mouse.move(left, top)
+    window.mouse.down()
+    window.mouse.move(left + 0.4 * box["width"], top + box["height"] - 6, steps=4)
+    window.mouse.up()
+    window.wait_for_selector(".bp-brush:has-text('samples chosen')")
+    chosen = int(re.sub(r"\D", "", window.text_content(".bp-brush span")))
+    assert 300 < chosen < 2500
+    assert window.evaluate(PICTURES_WITH_A_CHOICE) >= 2
+    window.click("text=Leave them out")
+    window.wait_for_selector("[aria-current=step]:has-text('rows left out')")
+    left_out = int(re.sub(r"\D", "", window.text_content("[aria-current=step] span")))
+    assert left_out == chosen

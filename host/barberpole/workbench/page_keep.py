@@ -58,7 +58,7 @@ class Keep:
 
     async def _firmware(self) -> None:
         self._said.text = "Building …"
-        budget = await self._session.build(self._board.value, self._build.value)
+        budget = await self._session.build(self._board.value, self._build.value or "")
         if budget is None:
             self._said.text = ""
             return
