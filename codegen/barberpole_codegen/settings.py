@@ -23,6 +23,8 @@ EARTH_UT = 50.0  # a typical ambient field, on top of which the coils are driven
 CURVATURE = 3  # the lowest odd power a bridge's law can miss
 OWN_OFFSET = ("bias.bridge_", "flip_asymmetry.offset_")  # parameters that are the electronic offset
 CONVERSIONS = 2  # of a channel other than the bridges' in a cycle: one after SET, one after RESET
+CONVERTER_NOISE_LSB = {"ads8688": 0.5, "stm32f4_adc": 1.0}
+"""rms of one conversion with its rounding: 92 dB (SBAS582); of a 12-bit converter beside a processor, estimated."""
 T0_C = 25.0  # at which the sensor file gives the bridge resistance
 
 
@@ -100,13 +102,17 @@ def residual_limit_ut(calibration: Calibration, board: Board) -> float:
 
 
 def point_noise_ut(calibration: Calibration, board: Board) -> float:
-    """Noise of one point, µT: that of the sensor file, or that of the calibration's log if larger.
+    """Noise of one point, µT: that of sensor file and converter, or that of the calibration's log if larger.
 
     White noise n averaged over T has the deviation n / sqrt(2 T); SET and RESET are averaged, and so are cycles.
     """
     seconds = 2.0 * board.selfcal.cycles_per_point * board.adc.samples_per_half / board.adc.sample_hz
     from_sensor = 1e-3 * board.sensor.noise_nt_per_rthz / math.sqrt(2.0 * seconds)
-    return max(from_sensor, (calibration.residual.noise_lsb or 0.0) / board.scale_lsb_per_ut)
+    summed = 2.0 * board.selfcal.cycles_per_point * board.adc.samples_per_half
+    from_converter = CONVERTER_NOISE_LSB.get(board.adc.part, 0.0) / board.scale_lsb_per_ut / math.sqrt(summed)
+    return max(
+        math.hypot(from_sensor, from_converter), (calibration.residual.noise_lsb or 0.0) / board.scale_lsb_per_ut
+    )
 
 
 def digest(constants: list[Constant]) -> str:

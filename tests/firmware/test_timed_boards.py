@@ -105,3 +105,56 @@ def test_coil_codes_reach_their_outputs(rig):
         last = [frame[1] << 8 | frame[2] for frame in hardware.dac._spi.written[-3:]]
     assert last == [middle + 1, middle - 2, middle + 3]
     assert hardware.coils.current_ma(0, 2 * middle) == board.coils.full_scale_ma[0]
+
+
+AMBIENT_UT, GAIN = (18.0, -6.0, 44.0), (1.03, 0.98, 1.01)
+
+
+class Bridges:
+    """What the converter's inputs would read: bridges flipped by the pulses, coils driven by the codes, in LSB."""
+
+    def __init__(self, board, mcu, hardware):
+        self._board, self._mcu, self._hardware = board, mcu, hardware
+        self._rng = np.random.default_rng(3)
+
+    def currents_ma(self):
+        if self._board.dac.part == "stm32f4_dac":
+            codes = [written(self._mcu, at)[-1] for at in (DAC + DAC_DHR12R1, DAC + DAC_DHR12R2, TIM4 + TIM["CCR1"])]
+        else:
+            sent = {frame[0]: frame[1] << 8 | frame[2] for frame in self._hardware.dac._spi.written[-40:]}
+            codes = [sent.get(8 + channel, 32768) for channel in range(3)]
+        middle = 1 << self._board.dac.bits - 1
+        full = self._board.coils.full_scale_ma
+        return [(code - middle) / middle * ma for code, ma in zip(codes, full, strict=True)]
+
+    def __call__(self, times, channels):
+        board, timer = self._board, self._mcu.tim8
+        state = 1.0 - 2.0 * ((times - timer.began) // (timer.top * timer.tick) % 2)
+        lsb_per_v = 2048 / board.adc.vref_v
+        codes = np.empty((len(times), 8))
+        currents = self.currents_ma()
+        for axis, current_ma in enumerate(currents):
+            field_ut = AMBIENT_UT[axis] + board.sensor.offset_coil_ut_per_ma * current_ma
+            codes[:, axis] = 2048 + state * GAIN[axis] * board.scale_lsb_per_ut * field_ut + 40
+            codes[:, 4 + axis] = 2048 + 1e-3 * current_ma * board.adc.coil_shunt_ohm * lsb_per_v
+        codes[:, 3] = board.sensor.bridge_v * board.adc.bridge_divider * lsb_per_v
+        codes[:, 7] = board.flip.strap_supply_v * board.adc.supply_divider * lsb_per_v
+        noise = self._rng.normal(0.0, 0.9, codes.shape)
+        return np.clip(np.round(codes + noise), 0, 4095)
+
+
+def test_self_calibration_runs_on_timed_samples(rig):
+    """Its points come from cycles after the new current has settled, though the ring is full of older ones."""
+    board, mcu, hardware = rig
+    mcu.converter.source = Bridges(board, mcu, hardware)
+    names = ("bp_selfcal", "bp_board", "bp_calibration", "bp_trajectory")
+    selfcal, constants, calibration, trajectory = map(__import__, names)
+    hardware.start()
+    hardware.dac.start(2)
+    result = selfcal.run(hardware.sampler, hardware.coils, hardware.compensator, trajectory, calibration, constants)
+    assert result.reasons == []
+    np.testing.assert_allclose(result.solution.gain, GAIN, rtol=3e-3)  # codes of 0.37 µT
+    np.testing.assert_allclose(result.current_ratio, 1.0, atol=5e-3)
+    assert result.temp_c() == pytest.approx(25.0, abs=1.0)
+    assert hardware.compensator.supply_v(hardware.sampler) == pytest.approx(16.0, rel=5e-3)
+    assert hardware.sampler.lost == 0

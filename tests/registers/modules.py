@@ -96,6 +96,10 @@ def _clock(mcu: Mcu) -> ModuleType:
         mcu.wait(CALL_UNITS)
         return mcu.now // UNITS_PER_US & PERIOD - 1
 
+    def ticks_ms() -> int:
+        mcu.wait(CALL_UNITS)
+        return mcu.now // (1000 * UNITS_PER_US) & PERIOD - 1
+
     def ticks_diff(end: int, start: int) -> int:
         return (end - start + PERIOD // 2 & PERIOD - 1) - PERIOD // 2
 
@@ -105,7 +109,9 @@ def _clock(mcu: Mcu) -> ModuleType:
     def sleep_us(us: int) -> None:
         mcu.wait(CALL_UNITS + us * UNITS_PER_US)
 
-    return _module("time", ticks_us=ticks_us, ticks_diff=ticks_diff, ticks_add=ticks_add, sleep_us=sleep_us)
+    return _module(
+        "time", ticks_us=ticks_us, ticks_ms=ticks_ms, ticks_diff=ticks_diff, ticks_add=ticks_add, sleep_us=sleep_us
+    )
 
 
 def _interrupts(mcu: Mcu) -> dict[str, object]:
