@@ -150,8 +150,8 @@ def _rows(power_up: _PowerUp, where: object) -> tuple[dict[str, np.ndarray], int
         return {}, 0
     if not layout:
         raise InputError(must("the board record's header", "one with columns", "none", where))
-    is_driver = power_up.header.get("role") == "coil_driver"
-    check_names([str(name) for name, _, _ in layout], where, readings=not is_driver)
+    other_role = power_up.header.get("role") in ("coil_driver", "array")
+    check_names([str(name) for name, _, _ in layout], where, readings=not other_role)
     kind = np.dtype([(f"{i} {name}", CODES[code]) for i, (name, code, _) in enumerate(layout)])
     whole = [f.payload for f in frames if f.payload and len(f.payload) % kind.itemsize == 0]
     table = np.frombuffer(b"".join(whole), kind)

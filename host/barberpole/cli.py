@@ -11,6 +11,7 @@ import typer
 import barberpole.blas  # noqa: F401  (sets what numpy reads when it is loaded, so it comes first)
 from barberpole import __version__
 from barberpole.commands import (
+    array,
     board,
     board_check,
     calibrate,
@@ -47,6 +48,7 @@ characterise.register(app)
 board.register(app)
 board_check.register(app)
 imcs.register(app)
+array.register(app)
 trajectory.register(app)
 design.register(app)
 challenge.register(app)

@@ -20,6 +20,10 @@ from barberpole.files import read_bytes, write_atomic
 from barberpole.log_formats import read_csv, read_parquet, write_csv, write_parquet
 from barberpole.polarity import pairs_are_raw
 
+ROLE_COMMANDS = {
+    "coil_driver": "a coil driver (`barberpole imcs` takes it)",
+    "array": "an array (`barberpole array` takes it)",
+}
 SUFFIXES = (".csv", ".parquet", ".bpr")
 
 
@@ -79,7 +83,7 @@ def read_log(path: str | Path) -> Log:
     data = read_bytes(path, "the log")
     if not data:
         raise InputError(must("the log", "a file with rows", "an empty file", path))
-    return _checked(reader(data, path))
+    return checked(reader(data, path))
 
 
 def write_log(log: Log, path: str | Path) -> None:
@@ -95,20 +99,21 @@ def write_log(log: Log, path: str | Path) -> None:
 
 def _from_csv(data: bytes, path: Path) -> Log:
     columns, notes, dropped = read_csv(data, path)
-    return Log(columns, path, _sha256(data), dropped, tuple(notes))
+    return Log(columns, path, file_sha256(data), dropped, tuple(notes))
 
 
 def _from_parquet(data: bytes, path: Path) -> Log:
     columns, notes, meta = read_parquet(data, path)
-    return Log(columns, path, _sha256(data), 0, tuple(notes), meta)
+    return Log(columns, path, file_sha256(data), 0, tuple(notes), meta)
 
 
 def _from_records(data: bytes, path: Path) -> Log:
     found = read_board_log(data, path)
-    if found.meta.get("role") == "coil_driver":
-        wanted = "one of a sensor (`barberpole imcs` joins it with its driver's)"
-        raise InputError(must("the log", wanted, "the currents of a coil driver", path))
-    return Log(found.columns, path, _sha256(data), found.skipped, found.notes, found.meta, found.selfcal)
+    role = found.meta.get("role", "sensor")
+    if role in ROLE_COMMANDS:
+        got = f"the record of {ROLE_COMMANDS[role]}"
+        raise InputError(must("the log", "one of a single sensor", got, path))
+    return Log(found.columns, path, file_sha256(data), found.skipped, found.notes, found.meta, found.selfcal)
 
 
 _READERS: dict[str, Callable[[bytes, Path], Log]] = {
@@ -118,11 +123,13 @@ _READERS: dict[str, Callable[[bytes, Path], Log]] = {
 }
 
 
-def _sha256(data: bytes) -> str:
+def file_sha256(data: bytes) -> str:
+    """Hash of a file's bytes in hex digits."""
     return hashlib.sha256(data).hexdigest()
 
 
-def _checked(log: Log) -> Log:
+def checked(log: Log) -> Log:
+    """A log in the contract: complete rows, times that do not go back, x_lsb.. beside pairs. Raises InputError."""
     if log.n == 0:
         raise InputError(must("the log", "one with rows", "only column names", log.path))
     log = _without_nan(log)

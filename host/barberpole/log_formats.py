@@ -20,13 +20,14 @@ THREADS_FROM = 1 << 20  # bytes; below, starting threads takes longer than readi
 _META = b"barberpole"
 
 
-def read_csv(data: bytes, where: object) -> tuple[Columns, list[str], int]:
+def read_csv(data: bytes, where: object, readings: bool = True) -> tuple[Columns, list[str], int]:
     """Columns of a comma-separated file with names in its first line: columns (NaN where empty), notes, rows dropped.
 
+    readings: whether there must be columns x_lsb.. (of an array they begin with the sensor's name).
     Raises InputError about the names, or about a cell of a known column that is no number, with its row.
     """
     names = _header(data, where)
-    check_names(names, where)
+    check_names(names, where, readings)
     dropped: list[Any] = []
     parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(row.number) or "skip")
     convert = pa_csv.ConvertOptions(null_values=NULLS, strings_can_be_null=True, true_values=[], false_values=[])
@@ -40,14 +41,14 @@ def read_csv(data: bytes, where: object) -> tuple[Columns, list[str], int]:
     return _floats(table, notes, where), notes, len(dropped)
 
 
-def read_parquet(data: bytes, where: object) -> tuple[Columns, list[str], dict[str, Any]]:
+def read_parquet(data: bytes, where: object, readings: bool = True) -> tuple[Columns, list[str], dict[str, Any]]:
     """Columns of a Parquet file, notes, and the metadata that `write_parquet` put there."""
     try:
         table = pa_parquet.read_table(pa.BufferReader(data), use_threads=len(data) > THREADS_FROM)
         meta = json.loads((table.schema.metadata or {}).get(_META, b"{}"))
     except (ValueError, OSError) as error:
         raise InputError(must("the log", "a Parquet file", _short(error), where)) from None
-    check_names(table.column_names, where)
+    check_names(table.column_names, where, readings)
     notes: list[str] = []
     return _floats(table, notes, where), notes, meta
 

@@ -21,6 +21,7 @@ from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
 from barberpole.methods.linear import linear_model, require_followed
 from barberpole.methods.readings import demodulated, require_regular
+from barberpole.observations import Observations
 
 WHAT = "the offset-coil method"
 LINEAR_ONLY = {"bias", "scale", "misalignment", "soft_iron"}
@@ -56,13 +57,9 @@ def offset_coil(log: Log, given: Given) -> Answer:
     Raises InputError without the columns ix_ma.., or where the currents do not span the three coils.
     """
     seen = demodulated(log, WHAT)
-    if seen.at.i_ma is None:
-        raise InputError(must(WHAT, "given the coil currents ix_ma, iy_ma, iz_ma", "a log without them", log.path))
-    size = np.linalg.svd(np.cov(seen.at.i_ma), compute_uv=False)
-    if not size[2] > FLAT**2 * size[0]:
-        raise InputError(must(WHAT, "given currents in all three coils", "fewer coils driven", log.path))
+    current_ma = require_driven(seen, log.path)
     ut_per_ma = given.sensor.offset_coil_ut_per_ma if given.sensor else NOMINAL_UT_PER_MA
-    coil_ut = ut_per_ma * seen.at.i_ma
+    coil_ut = ut_per_ma * current_ma
     require_regular(seen.y, coil_ut, log.path)
     found = linear_model(seen.y, coil_ut)
     require_followed(found, seen.y, coil_ut, "the coil currents", log.path)
@@ -73,6 +70,16 @@ def offset_coil(log: Log, given: Given) -> Answer:
     if given.against is None:
         return Answer(values, notes=("give --against a classical calibration for S_c sigma_c and B_c (eq. 6.7)",))
     return Answer(values | _carried(transfer(coil, affine_of(given.against))))
+
+
+def require_driven(seen: Observations, where: object) -> np.ndarray:
+    """Coil currents (3, n) in mA. Raises InputError without them, or where they do not span the three coils."""
+    if seen.at.i_ma is None:
+        raise InputError(must(WHAT, "given the coil currents ix_ma, iy_ma, iz_ma", "a log without them", where))
+    size = np.linalg.svd(np.cov(seen.at.i_ma), compute_uv=False)
+    if not size[2] > FLAT**2 * size[0]:
+        raise InputError(must(WHAT, "given currents in all three coils", "fewer coils driven", where))
+    return seen.at.i_ma
 
 
 def affine_of(calibration: Calibration) -> Affine:
