@@ -129,6 +129,12 @@ class Model:
         slope = _pull(head, slope, columns, at, p, field_too)
         return y, columns, full(slope, y.shape[1]) if field_too else None
 
+    def slope(self, field_ut: Array, p: Numbers, at: Conditions) -> Array:
+        """d reading / d field (3, 3, n) by the field of the same sample, other samples' fields held."""
+        head, inner = _follow(self.head, field_ut, p, at)
+        tail = _pull(head, self._rest_slope(inner, p, at)[1], None, at, p, True)
+        return full(tail, field_ut.shape[1])
+
     def _rest_slope(self, field_ut, p, at, columns=None) -> tuple[Array, Array]:
         """Readings and d reading / d field of the stages after the head; the parameters' columns are added up."""
         y: Array = np.zeros(np.shape(field_ut))
@@ -230,10 +236,10 @@ def _undo(terms, xyz, p, at):
 
 def compose(names: Sequence[str], setups: dict[str, Setup] | Setup, extra: Sequence[Effect] = ()) -> Model:
     """The model of these effects, in physical order whatever the order of the names."""
-    order = in_order(extra)
-    chosen = {find_effect(name, extra).name: find_effect(name, extra) for name in names}
+    order = {effect.name: place for place, effect in enumerate(in_order(extra))}
+    chosen = {effect.name: effect for effect in (find_effect(name, extra) for name in names)}
     terms, start = [], 0
-    for effect in sorted(chosen.values(), key=order.index):
+    for effect in sorted(chosen.values(), key=lambda effect: order[effect.name]):
         setup = setups if isinstance(setups, Setup) else setups[effect.name]
         params = effect.params(setup)
         terms.append(Term(effect, params, slice(start, start + len(params))))

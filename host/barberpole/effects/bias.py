@@ -55,5 +55,6 @@ BIAS = Effect(
     forward,
     undo,
     jacobian,
+    affine=True,
     summary="a constant is added to each axis: hard iron, or the offset of bridge and amplifier",
 )

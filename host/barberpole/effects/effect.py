@@ -153,6 +153,7 @@ class Effect:
     requires    log columns without which it cannot be judged
     flips       it tells SET from RESET, so a demodulated reading is the mean of two evaluations
     memory      a sample depends on earlier ones or their conditions: it needs whole time series
+    affine      a matrix and a constant, the same for every sample, unless readings came raw
     tangent     (xyz, p, at, chain (3, K, n)) -> (3, K, n): derivatives of the input carried to the output, for an
                 effect whose output depends on the field of other samples
     stage       "field" or "reading": where a user's effect enters the stack
@@ -175,6 +176,7 @@ class Effect:
     summary: str = ""
     joint: Callable[[Components, Numbers, Conditions], tuple[Components, Array | None, Array]] | None = None
     memory: bool = False
+    affine: bool = False
     tangent: Callable[[Components, Numbers, Conditions, Array], Array] | None = None
     stage: str = "field"
     loss: str | None = None

@@ -59,5 +59,6 @@ MISALIGNMENT = Effect(
     forward,
     undo,
     joint=joint,
+    affine=True,
     summary="the sensitive axes are not at right angles, or not along the axes of the reference",
 )

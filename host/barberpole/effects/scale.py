@@ -40,5 +40,6 @@ SCALE = Effect(
     forward,
     undo,
     jacobian,
+    affine=True,
     summary="each axis has its own sensitivity",
 )

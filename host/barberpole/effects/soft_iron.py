@@ -60,5 +60,6 @@ SOFT_IRON = Effect(
     forward,
     undo,
     jacobian,
+    affine=True,
     summary="iron that turns with the sensor bends the field towards itself",
 )

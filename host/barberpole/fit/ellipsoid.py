@@ -11,6 +11,7 @@ import numpy as np
 
 from barberpole.errors import InputError
 
+CHUNK = 8192  # samples at a time
 MIN_SAMPLES = 12  # nine unknowns, and something left to judge them by
 
 
@@ -26,12 +27,6 @@ class Ellipsoid:
         return self.upper @ (reading - self.centre[:, None])
 
 
-def quadric_columns(h: np.ndarray) -> np.ndarray:
-    """The nine regressors of the quadric, (9, n): h^T D h and the linear part of 4.14."""
-    x, y, z = h
-    return np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, 2 * x, 2 * y, 2 * z])
-
-
 def algebraic(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
     """Least-squares ellipsoid through readings (3, n) in LSB, scaled so that |H| = magnitude (4.19).
 
@@ -44,10 +39,9 @@ def algebraic(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
     size = float(np.max(np.ptp(reading, axis=1))) / 2
     if size == 0:
         raise InputError("an ellipsoid fit must have readings that move; got constant readings on all axes")
-    columns = quadric_columns((reading - middle[:, None]) / size)
-    gram = columns @ columns.T
+    gram, total = _normal_equations(reading, middle, size)
     try:
-        q = np.linalg.solve(gram, columns.sum(axis=1))
+        q = np.linalg.solve(gram, total)
     except np.linalg.LinAlgError:
         raise InputError(coverage_message(reading)) from None
     d = np.array([[q[0], q[3], q[4]], [q[3], q[1], q[5]], [q[4], q[5], q[2]]])
@@ -56,6 +50,21 @@ def algebraic(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
     b = -np.linalg.solve(d, q[6:])
     upper = np.linalg.cholesky(d / (1.0 + b @ d @ b)).T  # (h-b)^T D (h-b) = 1 + b^T D b
     return Ellipsoid(magnitude * upper / size, middle + size * b)
+
+
+def _normal_equations(reading: np.ndarray, middle: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of x x, y y, z z, 2xy, 2xz, 2yz, 2x, 2y, 2z (h^T D h and the linear part of 4.14) against one: (9, 9), (9,)."""
+    gram, n = np.zeros((10, 10)), reading.shape[1]
+    rows = np.ones((10, min(n, CHUNK)))
+    for at in range(0, n, CHUNK):
+        h = (reading[:, at : at + CHUNK] - middle[:, None]) / size
+        part = rows[:, : h.shape[1]]
+        np.multiply(h, h, out=part[:3])
+        np.multiply(h, 2.0, out=part[6:9])
+        np.multiply(part[6], h[1:], out=part[3:5])
+        np.multiply(part[7], h[2], out=part[5])
+        gram += part @ part.T
+    return gram[:9, :9], gram[:9, 9]
 
 
 def coverage_message(reading: np.ndarray) -> str:

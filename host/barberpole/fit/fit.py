@@ -8,7 +8,9 @@ import numpy as np
 from barberpole.effects import Effect, Setup, find_effect
 from barberpole.errors import InputError
 from barberpole.fit import observability
-from barberpole.fit.gram import Gram, accumulate, heldout_rms
+from barberpole.fit.affine import moments
+from barberpole.fit.ellipsoid import coverage_message
+from barberpole.fit.gram import Gram, heldout_rms
 from barberpole.fit.residual import Problem
 from barberpole.fit.solve import Solution, minimise
 from barberpole.fit.start import Linear, linear_part, start_values
@@ -21,6 +23,7 @@ OUTLIER = 4.0  # robust standard deviations; one normal reading in 16 000 lies b
 MAD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
 GIANT = 20.0  # the same at the start of a fit, whose residual is not all noise yet
 OUTLIER_PASSES = 4
+THIN = 2.5  # residuals: readings this flat follow any surface, and a fit bends it round their noise
 NOMINAL_MAGNITUDE_UT = 50.0  # where only its constancy is known; the scale is then relative to it
 
 
@@ -104,10 +107,13 @@ def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect
     require_columns(seen, file.effects, extra)
     seen = with_reference(seen, file)
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
-    linear = linear_part(seen, magnitude)
-    known = {find_effect(name, extra).name: setup_of(seen, linear, file.settings.get(name)) for name in file.effects}
+    taken = None if seen.b_ut is None else moments(seen.y, seen.b_ut)
+    linear = linear_part(seen, magnitude, taken)
+    setup = setup_of(seen, linear)
+    known = {find_effect(n, extra).name: replace(setup, settings=file.settings.get(n, {})) for n in file.effects}
     model = compose(file.effects, known, extra)
-    return fit_problem(Problem(model, seen, magnitude), linear, known, tuple(extra), start_values(model, linear), tick)
+    problem = Problem(model, seen, magnitude, moments=taken)
+    return fit_problem(problem, linear, known, tuple(extra), start_values(model, linear), tick)
 
 
 def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float], hold: frozenset[str] = frozenset()) -> Fit:
@@ -183,7 +189,10 @@ def fit_problem(
     tick=None,
     held: frozenset[str] = frozenset(),
 ) -> Fit:
-    """Minimise from p, freezing what the log cannot determine, and leaving outliers out where the model says so."""
+    """Minimise from p, freezing what the log cannot determine, and leaving outliers out where the model says so.
+
+    Raises InputError where there are too few readings, or, against a magnitude, where they lie in a plane.
+    """
     if problem.n * problem.residuals_per_sample <= len(p):
         raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
     if problem.model.loss is None:
@@ -198,6 +207,8 @@ def fit_problem(
             break
         problem = replace(problem, believed=believed)
         solution = _determined(problem, solution.p, solution.free, tick)
+    if not problem.vector and problem.thinnest < THIN * solution.gram.rms():
+        raise InputError(coverage_message(problem.seen.y))
     cov = observability.covariance(solution.gram, solution.free)
     return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra, held)
 
@@ -218,13 +229,14 @@ def _determined(problem: Problem, p: np.ndarray, free: np.ndarray, tick=None) ->
     """Freeze first what is dependent, then what is undetermined, at its null."""
     null = problem.model.null
     # a singular start leads a fit astray
-    free = free & ~observability.dependent(problem.model, accumulate(problem, p), free)
+    first = problem.gram(p, 0.0, tick)
+    free = free & ~observability.dependent(problem.model, first, free)
     while True:
-        solution = minimise(problem, p, free, tick)
+        solution = minimise(problem, p, free, first, tick)
         keep = observability.independent(problem.model, solution.gram, free)
         if solution.converged:  # the covariance says nothing of a fit that went astray
             _freeze_undetermined(problem.model, solution, keep)
         if np.array_equal(keep, free):
             return solution
-        p = np.where(free & ~keep, null, solution.p)
+        p, first = np.where(free & ~keep, null, solution.p), None
         free = keep

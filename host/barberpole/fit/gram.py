@@ -1,22 +1,36 @@
 """Normal equations by contiguous blocks of the log: one pass gives the step, the covariance and the held-out error."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 BLOCKS = 10  # contiguous, so that a held-out stretch is really unseen; folds leave out two of them at a time
 FOLDS = 5
 
+Tick = Callable[[int], None] | None
+"""Told how many samples more are done."""
+
+
+@dataclass(frozen=True)
+class Lengthening:
+    """What noise does to a scalar residual, r = r_0 - sigma^2 c: sums per block of J^T c (B, P), r_0 c and c c (B,)."""
+
+    jc: np.ndarray
+    rc: np.ndarray
+    cc: np.ndarray
+
 
 @dataclass(frozen=True)
 class Gram:
-    """Per block: J^T J (B, P, P), J^T r (B, P), r^T r (B,), residuals m (B,)."""
+    """Per block: J^T J (B, P, P), J^T r (B, P), r^T r (B,), residuals m (B,). r is that of noise `sigma`."""
 
     jj: np.ndarray
     jr: np.ndarray
     rr: np.ndarray
     m: np.ndarray
+    longer: Lengthening | None = None
+    sigma: float = 0.0
 
     @property
     def cost(self) -> float:
@@ -27,12 +41,27 @@ class Gram:
         return int(self.m.sum())
 
     def take(self, columns: np.ndarray) -> "Gram":
-        """The same for some of the parameters."""
+        """The same for some of the parameters, at the noise that it has."""
         return Gram(self.jj[:, columns][:, :, columns], self.jr[:, columns], self.rr, self.m)
 
     def rms(self) -> float:
         """Root mean square residual."""
         return float(np.sqrt(self.cost / max(self.count, 1)))
+
+    def at_noise(self, sigma: float) -> "Gram":
+        """The same for another noise in LSB: no second pass."""
+        if self.longer is None or sigma == self.sigma:
+            return self
+        more, c = sigma**2 - self.sigma**2, self.longer
+        jr, rr = self.jr - more * c.jc, self.rr - 2.0 * more * c.rc + more**2 * c.cc
+        return replace(self, jr=jr, rr=np.maximum(rr, 0.0), longer=replace(c, rc=c.rc - more * c.cc), sigma=sigma)
+
+    def moved(self, step: np.ndarray) -> "Gram":
+        """The same after a small step (P,) of the parameters, by the derivatives that it holds: no second pass."""
+        h = self.jj @ step
+        rr = self.rr - 2.0 * (self.jr @ step) + h @ step
+        longer = self.longer and replace(self.longer, rc=self.longer.rc - self.longer.jc @ step)
+        return replace(self, jr=self.jr - h, rr=np.maximum(rr, 0.0), longer=longer)
 
 
 def block_edges(n: int) -> np.ndarray:
@@ -40,20 +69,39 @@ def block_edges(n: int) -> np.ndarray:
     return np.linspace(0, n, BLOCKS + 1).astype(int)
 
 
-def accumulate(problem, p: np.ndarray, sigma: float = 0.0, tick: Callable[[int], None] | None = None) -> Gram:
+def empty(size: int, scalar: bool) -> Gram:
+    """Nothing yet, for `size` parameters."""
+    sums = (np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size)), np.zeros(BLOCKS), np.zeros(BLOCKS))
+    return Gram(*sums, Lengthening(np.zeros((BLOCKS, size)), np.zeros(BLOCKS), np.zeros(BLOCKS)) if scalar else None)
+
+
+def accumulate(problem, p: np.ndarray, sigma: float = 0.0, tick: Tick = None) -> Gram:
     """One pass over the log at parameters p. `tick` is told the samples done."""
-    size, edges = len(p), block_edges(problem.n)
-    gram = Gram(np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size)), np.zeros(BLOCKS), np.zeros(BLOCKS))
+    gram = empty(len(p), not problem.vector)
+    problem.add_to(gram, p, block_edges(problem.n), 0, tick)
+    return gram.at_noise(sigma)
+
+
+def add_samples(gram: Gram, problem, p: np.ndarray, edges: np.ndarray, before: int, tick: Tick = None) -> None:
+    """Add the samples of a problem to sums without noise. Of the whole log, `before` samples came before them; `edges`
+    are those of its blocks."""
+    linearise = problem.linearisation(p)
     for rows in problem.chunks():
-        r, j = problem.linearise(p, rows, sigma)
-        for block in range(BLOCKS):
-            first, last = max(edges[block], rows.start) - rows.start, min(edges[block + 1], rows.stop) - rows.start
-            if first < last:
-                _add(gram, block, r[:, first:last], j[:, :, first:last])
-                gram.m[block] += problem.counted(slice(rows.start + first, rows.start + last))
+        r, j, longer = linearise(rows)
+        for block, part in pieces(edges, before, rows):
+            _add(gram, block, r[:, part], j[:, :, part])
+            gram.m[block] += problem.counted(slice(rows.start + part.start, rows.start + part.stop))
+            if gram.longer is not None and longer is not None:
+                _add_longer(gram.longer, block, r[0, part], j[0, :, part], longer[part])
         if tick:
             tick(rows.stop - rows.start)
-    return gram
+
+
+def pieces(edges: np.ndarray, before: int, rows: slice) -> Iterator[tuple[int, slice]]:
+    """The blocks that a chunk of samples reaches into, and which samples of the chunk are theirs."""
+    first, last = rows.start + before, rows.stop + before
+    for block in range(int(np.searchsorted(edges, first, "right")) - 1, int(np.searchsorted(edges, last))):
+        yield block, slice(max(int(edges[block]), first) - first, min(int(edges[block + 1]), last) - first)
 
 
 def _add(gram: Gram, block: int, r: np.ndarray, j: np.ndarray) -> None:
@@ -61,6 +109,12 @@ def _add(gram: Gram, block: int, r: np.ndarray, j: np.ndarray) -> None:
         gram.jj[block] += columns @ columns.T
         gram.jr[block] += columns @ residual
         gram.rr[block] += residual @ residual
+
+
+def _add_longer(longer: Lengthening, block: int, r: np.ndarray, j: np.ndarray, c: np.ndarray) -> None:
+    longer.jc[block] += j @ c
+    longer.rc[block] += r @ c
+    longer.cc[block] += c @ c
 
 
 def heldout_rms(gram: Gram) -> float:

@@ -18,16 +18,12 @@ def independent(model: Model, gram: Gram, free: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.diag(h))
     usable = free & (size > 1e-12 * max(size.max(initial=0.0), 1e-300))
     size = np.where(usable, size, 1.0)
-    corr = h / np.outer(size, size)
+    left = h / np.outer(size, size)  # the columns' products once those kept so far are taken off
     keep = np.zeros_like(free)
-    for j in sorted(np.flatnonzero(usable), key=lambda j: model.names[j].split(".")[0] not in BASIC):
-        kept = np.flatnonzero(keep)
-        if kept.size:
-            within = corr[np.ix_(kept, kept)]
-            left = 1.0 - corr[j, kept] @ np.linalg.solve(within, corr[kept, j])
-        else:
-            left = 1.0
-        keep[j] = left > RANK
+    for j in sorted(np.flatnonzero(usable).tolist(), key=lambda j: model.names[j].split(".")[0] not in BASIC):
+        if left[j, j] > RANK:
+            keep[j] = True
+            left -= left[:, j, None] * (left[j] / left[j, j])
     return keep
 
 

@@ -5,16 +5,20 @@ taken back through the model, and the residual is the distance of the reading fr
 reading space: one residual a sample, of the same noise as one reading whatever the gains of the axes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
+from barberpole.chain import solve3
+from barberpole.fit.affine import Moments, add_surface, coefficients, is_affine
+from barberpole.fit.gram import Gram, Tick, accumulate, add_samples
 from barberpole.model import Model
 from barberpole.observations import Observations
 
 CHUNK = 4096  # samples at a time: the working set stays in the cache, and memory does not grow with the log
+Linearised = tuple[np.ndarray, np.ndarray, np.ndarray | None]
 DIFFERENCE = 1e-6  # of a parameter's size: step of a numerical derivative
 
 
@@ -22,13 +26,15 @@ DIFFERENCE = 1e-6  # of a parameter's size: step of a numerical derivative
 class Problem:
     """A model held against observations. `magnitude_ut` is K where the log does not carry one (reference constant).
 
-    believed (m, n): False where a residual is taken for an outlier and does not count.
+    believed (m, n): False where a residual is taken for an outlier and does not count. moments: of these readings
+    against the known field, if they were taken.
     """
 
     model: Model
     seen: Observations
     magnitude_ut: float = 50.0
     believed: np.ndarray | None = None
+    moments: Moments | None = None
 
     @property
     def vector(self) -> bool:
@@ -53,55 +59,97 @@ class Problem:
         for at in range(0, self.n, size):
             yield slice(at, min(at + size, self.n))
 
-    def linearise(self, p: np.ndarray, rows: slice, sigma: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (m, k) and model derivative (m, P, k) for the k samples of `rows`; m = 3 vector, 1 scalar.
+    @property
+    def affine(self) -> bool:
+        """Whether every sample sees the same matrix and constant."""
+        return is_affine(self.model, self.seen.at)
+
+    @property
+    def largest(self) -> float:
+        """The largest reading in LSB."""
+        return max(float(np.max(self.seen.y, initial=0.0)), -float(np.min(self.seen.y, initial=0.0)))
+
+    @cached_property
+    def thinnest(self) -> float:
+        """Standard deviation of the readings where their cloud is thinnest, LSB."""
+        mean = self.seen.y.mean(axis=1)
+        spread = self.seen.y @ self.seen.y.T / self.n - np.outer(mean, mean)
+        return float(np.sqrt(max(np.linalg.eigvalsh(spread)[0], 0.0)))
+
+    def gram(self, p: np.ndarray, sigma: float = 0.0, tick: Tick = None) -> Gram:
+        """Normal equations at parameters p: one pass over the log, or none where its moments say it all.
 
         sigma (LSB): noise of a reading, which lengthens the fitted field of a scalar reference a little.
         """
-        residual, d_p = self._linearise(p, rows, sigma)
-        if self.believed is None:
-            return residual, d_p
-        believed = self.believed[:, rows]
-        return residual * believed, d_p * believed[:, None]
+        known = self.moments
+        if known is None or known.y is not self.seen.y or self.believed is not None or not self.affine:
+            return accumulate(self, p, sigma, tick)
+        return known.gram(*coefficients(self.model, p, self.seen.at))
 
-    def _linearise(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
-        seen, at = self.seen, self.seen.at.take(rows)
-        if seen.b_ut is not None:
-            y, d_p, _ = self.model.linearise(seen.b_ut[:, rows], p, at)
-            return seen.y[:, rows] - y, d_p
-        if self.remembers:
-            return self._with_memory(p, rows, sigma)
-        residual, normal, d_p = self._distance(p, rows, sigma)
-        return residual[None], (normal[0] * d_p[0] + normal[1] * d_p[1] + normal[2] * d_p[2])[None]
+    def add_to(self, gram: Gram, p: np.ndarray, edges: np.ndarray, before: int, tick: Tick = None) -> None:
+        """Add these samples at parameters p to sums over a log in which `before` samples came before them."""
+        add = add_surface if self.affine and not self.vector else add_samples
+        add(gram, self, p, edges, before, tick)
 
-    def _distance(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Distance (k,) of the readings from |B| = K in LSB, the unit normal there (3, k), d reading / d p."""
+    def linearisation(self, p: np.ndarray) -> Callable[[slice], Linearised]:
+        """A function of `rows` (k samples) for parameters p -> residual (m, k) and model derivative (m, P, k); m = 3
+        vector, 1 scalar. Of a scalar reference also c (k,): noise of sigma (LSB) adds sigma^2 c to the residual.
+        """
+        if self.vector:
+            one = partial(self._against_field, p)
+        else:
+            one = partial(self._with_memory if self.remembers else self._against_magnitude, p)
+        return one if self.believed is None else lambda rows: self._masked(one(rows), rows)
+
+    def _masked(self, found: Linearised, rows: slice) -> Linearised:
+        """Without the residuals that are not believed."""
+        (residual, d_p, longer), believed = found, np.asarray(self.believed)[:, rows]
+        return residual * believed, d_p * believed[:, None], None if longer is None else longer * believed[0]
+
+    def _against_field(self, p: np.ndarray, rows: slice) -> Linearised:
+        seen = self.seen
+        y, d_p, _ = self.model.linearise(np.asarray(seen.b_ut)[:, rows], p, seen.at.take(rows))
+        return seen.y[:, rows] - y, d_p, None
+
+    def _against_magnitude(self, p: np.ndarray, rows: slice) -> Linearised:
+        residual, normal, longer, field, slope = self._distance(p, rows)
+        # noise along the normal must not reach the derivatives: they are taken at the foot point on the surface
+        foot = field - solve3(slope, normal * residual)
+        d_p = self.model.linearise(foot, p, self.seen.at.take(rows))[1]
+        return residual[None], (normal[0] * d_p[0] + normal[1] * d_p[1] + normal[2] * d_p[2])[None], longer
+
+    def _distance(
+        self, p: np.ndarray, rows: slice
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Distance (k,) of the readings from |B| = K in LSB, the unit normal there (3, k), what noise adds (k,), the
+        fitted field (3, k) and d reading / d field (3, 3, k)."""
         at = self.seen.at.take(rows)
         field = self.model.invert(self.seen.y[:, rows], p, at)
-        _, d_p, slope = self.model.linearise(field, p, at, field_too=True)
-        cofactor, det = cofactors(np.asarray(slope))
+        slope = self.model.slope(field, p, at)
+        cofactor, det = cofactors(slope)
         norm = np.sqrt(np.sum(field * field, axis=0))
         gradient = np.sum(cofactor * (field / norm), axis=1) / det  # of |B| with respect to the reading
         steep = np.sqrt(np.sum(gradient * gradient, axis=0))
         known = self.magnitude(rows)
         # noise across the field lengthens it on average by its variance / 2K; unmodelled, more data do not help
         across = np.sum(cofactor * cofactor, axis=(0, 1)) / (det * det) - steep * steep
-        return (norm - known - sigma * sigma * across / (2.0 * known)) / steep, gradient / steep, d_p
+        return (norm - known) / steep, gradient / steep, across / (2.0 * known * steep), field, slope
 
-    def _with_memory(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+    def _with_memory(self, p: np.ndarray, rows: slice) -> Linearised:
         """The same where the fitted field of a sample depends on earlier readings.
 
         Those effects' own derivatives are taken by one inversion each. The others' stand as if they had no memory:
         right to first order in it, which leaves the answer consistent.
         """
-        base, normal, d_p = self._distance(p, rows, sigma)
+        base, normal, longer, field, _ = self._distance(p, rows)
+        d_p = self.model.linearise(field, p, self.seen.at.take(rows))[1]
         derivative = normal[0] * d_p[0] + normal[1] * d_p[1] + normal[2] * d_p[2]
         for term in self.model.terms:
             for j in range(term.at.start, term.at.stop) if term.effect.tangent else ():
                 step = np.zeros(len(p))
                 step[j] = DIFFERENCE * max(abs(p[j]), abs(self.model.params[j].typical or 1.0))
-                derivative[j] = (base - self._distance(p + step, rows, sigma)[0]) / step[j]
-        return base[None], derivative[None]
+                derivative[j] = (base - self._distance(p + step, rows)[0]) / step[j]
+        return base[None], derivative[None], longer
 
     def counted(self, rows: slice) -> int:
         """How many residuals of `rows` count."""
@@ -117,7 +165,7 @@ class Problem:
         """All residuals (m, n) in LSB, outliers too."""
         seen = self.seen
         if seen.b_ut is None:
-            return np.concatenate([self._distance(p, rows, 0.0)[0] for rows in self.chunks()])[None]
+            return np.concatenate([self._distance(p, rows)[0] for rows in self.chunks()])[None]
         field = seen.b_ut
         parts = [seen.y[:, r] - self.model.predict(field[:, r], p, seen.at.take(r)) for r in self.chunks()]
         return np.concatenate(parts, axis=1)

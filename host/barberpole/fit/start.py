@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from barberpole.effects.misalignment import LOWER, UPPER
+from barberpole.fit.affine import Moments, moments
 from barberpole.fit.ellipsoid import Ellipsoid, algebraic
 from barberpole.model import Model
 from barberpole.observations import Observations
@@ -31,10 +32,11 @@ class Linear:
         return float(np.mean(np.sqrt(np.sum(self.matrix**2, axis=1))))
 
 
-def linear_part(seen: Observations, magnitude_ut: float) -> Linear:
+def linear_part(seen: Observations, magnitude_ut: float, known_moments: Moments | None = None) -> Linear:
     """Closed-form start: least squares against a known field, the algebraic ellipsoid against a known magnitude."""
     if seen.b_ut is not None:
-        return _against_field(seen.y, seen.b_ut)
+        best = (known_moments or moments(seen.y, seen.b_ut)).best()
+        return Linear(best[:, 1:], best[:, 0], max(float(np.max(seen.b_ut)), -float(np.min(seen.b_ut))))
     known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude_ut
     bridge = _bridge(seen)
     shape = trimmed(seen.y - seen.at.state * bridge[:, None], known)
@@ -62,14 +64,6 @@ def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
             break
         shape, kept = algebraic(y[:, near], magnitude_ut), near
     return shape
-
-
-def _against_field(y: np.ndarray, field_ut: np.ndarray) -> Linear:
-    columns = np.vstack([field_ut, np.ones(field_ut.shape[1])])
-    gram = columns @ columns.T
-    # directions the field never took are left out by the pseudo-inverse, for observability to name
-    answer = y @ columns.T @ np.linalg.pinv(gram, rcond=1e-9, hermitian=True)
-    return Linear(answer[:, :3], answer[:, 3], float(np.max(np.abs(field_ut))))
 
 
 def start_values(model: Model, linear: Linear) -> np.ndarray:

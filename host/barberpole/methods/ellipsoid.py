@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from barberpole.fit.ellipsoid import Ellipsoid, algebraic, coverage_message, quadric_columns
+from barberpole.fit.ellipsoid import Ellipsoid, algebraic, coverage_message
 
-__all__ = ["Ellipsoid", "algebraic", "coverage_message", "cramer_rao", "efficient", "quadric_columns"]
+__all__ = ["Ellipsoid", "algebraic", "coverage_message", "cramer_rao", "efficient"]
 
 CHUNK = 4096  # readings at a time, so that the columns of (2) stay in the cache
 MAX_STEPS = 8
