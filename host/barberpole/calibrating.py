@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from barberpole.adding import noise_from_differences
 from barberpole.board_log import SelfcalRun
 from barberpole.calibration import Calibration
 from barberpole.calibration_tables import Residual, Step, Validity, Value
@@ -40,28 +39,26 @@ def calibration_of(
 
 def residual_of(fit: Fit) -> Residual:
     """How well the fit does."""
-    residual = fit.problem.residual(fit.p)
+    found = fit.figures
     return Residual(
-        n=fit.problem.n,
+        n=fit.n,
         rms_lsb=fit.rms_lsb,
-        rms_ut=fit.rms_ut(),
-        noise_lsb=noise_from_differences(residual),
+        rms_ut=found.rms_ut,
+        noise_lsb=found.noise_lsb,
         heldout_rms_lsb=fit.heldout_rms_lsb,
-        rms_norm_percent=fit.rms_norm_percent(),
+        rms_norm_percent=found.rms_norm_percent,
     )
 
 
 def validity_of(fit: Fit) -> Validity:
     """The range of fields and temperatures in the log."""
-    seen = fit.problem.seen
-    field = seen.b_ut if seen.b_ut is not None else fit.field()
-    temp = seen.at.temp_c
+    found = fit.figures
     return Validity(
-        field_min_ut=_triple(field.min(axis=1)),
-        field_max_ut=_triple(field.max(axis=1)),
-        b_max_ut=float(np.max(np.linalg.norm(field, axis=0))),
-        temp_min_c=None if temp is None else float(np.min(temp)),
-        temp_max_c=None if temp is None else float(np.max(temp)),
+        field_min_ut=_triple(found.field_min_ut),
+        field_max_ut=_triple(found.field_max_ut),
+        b_max_ut=found.b_max_ut,
+        temp_min_c=None if found.temp_c is None else found.temp_c[0],
+        temp_max_c=None if found.temp_c is None else found.temp_c[1],
     )
 
 

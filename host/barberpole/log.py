@@ -133,8 +133,8 @@ def checked(log: Log) -> Log:
     if log.n == 0:
         raise InputError(must("the log", "one with rows", "only column names", log.path))
     log = _without_nan(log)
-    _check_time(log)
-    _check_state(log)
+    check_time(log)
+    check_state(log)
     extra = names_of.unknown(log.columns)
     if extra:
         log = _noted(log, f"columns kept but not used: {', '.join(extra)}")
@@ -161,17 +161,19 @@ def _without_nan(log: Log) -> Log:
     return _noted(kept, f"{int(worst.sum())} of {log.n} rows were dropped for missing numbers ({where})")
 
 
-def _check_time(log: Log) -> None:
+def check_time(log: Log, before: int = 0) -> None:
+    """Raise InputError where time goes back. `before` rows of the file came before these."""
     if log.has("t_s") and np.any(back := np.diff(log["t_s"]) < 0):
         row = int(np.argmax(back)) + 1
-        got = f"{log['t_s'][row]:.9g} after {log['t_s'][row - 1]:.9g} in row {row + 1}"
+        got = f"{log['t_s'][row]:.9g} after {log['t_s'][row - 1]:.9g} in row {before + row + 1}"
         raise InputError(must("column t_s", "times that do not go back", got, log.path))
 
 
-def _check_state(log: Log) -> None:
+def check_state(log: Log, before: int = 0) -> None:
+    """Raise InputError where the state is none."""
     if log.has("state") and not np.all(known := np.isin(log["state"], (-1, 0, 1))):
         row = int(np.argmin(known))
-        got = f"{log['state'][row]:g} in row {row + 1}"
+        got = f"{log['state'][row]:g} in row {before + row + 1}"
         raise InputError(must("column state", "+1 (SET), -1 (RESET) or 0 (demodulated)", got, log.path))
 
 

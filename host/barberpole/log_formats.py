@@ -26,7 +26,7 @@ def read_csv(data: bytes, where: object, readings: bool = True) -> tuple[Columns
     readings: whether there must be columns x_lsb.. (of an array they begin with the sensor's name).
     Raises InputError about the names, or about a cell of a known column that is no number, with its row.
     """
-    names = _header(data, where)
+    names = header_of(data, where)
     check_names(names, where, readings)
     dropped: list[Any] = []
     parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(row.number) or "skip")
@@ -36,7 +36,7 @@ def read_csv(data: bytes, where: object, readings: bool = True) -> tuple[Columns
         table = pa_csv.read_csv(io.BytesIO(_as_utf8(data)), read, parse, convert)
     except pa.ArrowInvalid as error:
         wanted = "comma-separated rows under a line of names"
-        raise InputError(must("the log", wanted, _short(error), where)) from None
+        raise InputError(must("the log", wanted, short(error), where)) from None
     notes = [f"{len(dropped)} rows without {len(names)} cells were dropped"] if dropped else []
     return _floats(table, notes, where), notes, len(dropped)
 
@@ -45,9 +45,9 @@ def read_parquet(data: bytes, where: object, readings: bool = True) -> tuple[Col
     """Columns of a Parquet file, notes, and the metadata that `write_parquet` put there."""
     try:
         table = pa_parquet.read_table(pa.BufferReader(data), use_threads=len(data) > THREADS_FROM)
-        meta = json.loads((table.schema.metadata or {}).get(_META, b"{}"))
+        meta = meta_of(table.schema)
     except (ValueError, OSError) as error:
-        raise InputError(must("the log", "a Parquet file", _short(error), where)) from None
+        raise InputError(must("the log", "a Parquet file", short(error), where)) from None
     check_names(table.column_names, where, readings)
     notes: list[str] = []
     return _floats(table, notes, where), notes, meta
@@ -68,7 +68,13 @@ def write_parquet(columns: Columns, meta: dict[str, Any]) -> bytes:
     return sink.getvalue()
 
 
-def _header(data: bytes, where: object) -> list[str]:
+def meta_of(schema: pa.Schema) -> dict[str, Any]:
+    """The metadata that `write_parquet` put into a file."""
+    return json.loads((schema.metadata or {}).get(_META, b"{}"))
+
+
+def header_of(data: bytes, where: object) -> list[str]:
+    """The column names in the first line of a CSV. Raises InputError where it holds none."""
     first = data.split(b"\n", 1)[0]
     if not first.strip():
         raise InputError(must("the log", "a line of column names and rows under it", "an empty first line", where))
@@ -134,5 +140,6 @@ def _first_text(values: pa.ChunkedArray) -> tuple[int, str]:
     return 0, ""
 
 
-def _short(error: Exception) -> str:
+def short(error: Exception) -> str:
+    """The first line of an error."""
     return str(error).splitlines()[0][:120]

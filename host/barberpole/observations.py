@@ -34,13 +34,16 @@ class Observations:
     notes: tuple[str, ...] = ()
 
 
-def observations(log: Log, sensor: Sensor | None = None) -> Observations:
-    """The log as a fit sees it. `sensor` gives the easy axes; without it those of Conditions hold (thesis 5.3.2)."""
+def observations(log: Log, sensor: Sensor | None = None, raw: bool | None = None) -> Observations:
+    """The log as a fit sees it. `sensor` gives the easy axes; without it those of Conditions hold (thesis 5.3.2).
+
+    raw: whether RESET readings have the reversed sign, where that is known; else the log says or its data decide.
+    """
     if log.has(*SET, *RESET):
-        y, state, raw = _pairs(log)
+        y, state, raw = _pairs(log, raw)
         repeat = 2
     else:
-        y, state, raw = _singles(log)
+        y, state, raw = _singles(log, raw)
         repeat = 1
     at = _conditions(log, state, raw, repeat, sensor)
     b_ut, b_mag = _repeated(log.stack(FIELD), repeat), _repeated(log.get("b_ut"), repeat)
@@ -49,9 +52,9 @@ def observations(log: Log, sensor: Sensor | None = None) -> Observations:
     return Observations(y, at, b_ut, b_mag, row, _reference(b_ut, b_mag), raw, notes)
 
 
-def _pairs(log: Log) -> tuple[np.ndarray, np.ndarray, bool]:
+def _pairs(log: Log, known: bool | None) -> tuple[np.ndarray, np.ndarray, bool]:
     """SET and RESET readings in turns: y (3, 2 n), state (2 n,), whether RESET was raw."""
-    raw = resets_are_raw(log)
+    raw = resets_are_raw(log) if known is None else known
     y = np.empty((3, 2 * log.n))
     y[:, 0::2] = [log[name] for name in SET]
     y[:, 1::2] = [log[name] for name in RESET]
@@ -59,11 +62,13 @@ def _pairs(log: Log) -> tuple[np.ndarray, np.ndarray, bool]:
     return np.where(raw & (state < 0), -y, y), state, raw
 
 
-def _singles(log: Log) -> tuple[np.ndarray, np.ndarray, bool]:
+def _singles(log: Log, known: bool | None) -> tuple[np.ndarray, np.ndarray, bool]:
     """One reading a row, in the state that its column gives; 0 without one."""
     y = np.stack([log[name] for name in READINGS])
     state = log["state"] if log.has("state") else np.zeros(log.n)
     flipped = state != 0
+    if known is not None:
+        return np.where(known & (state < 0), -y, y), state, known
     if not (np.any(state > 0) and np.any(state < 0)):
         return y, state, False
     field = log.stack(FIELD)

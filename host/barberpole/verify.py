@@ -1,6 +1,6 @@
 """Is this board still what its calibration says? Each check gives a sentence with its figure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,8 +12,10 @@ from barberpole.columns import CURRENT
 from barberpole.errors import InputError, must
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, require_columns
 from barberpole.fit.residual import Problem
+from barberpole.fit.stream import Streamed
 from barberpole.fitted import Fitted, from_calibration
 from barberpole.log import Log
+from barberpole.log_stream import LogStream
 from barberpole.observations import Observations, observations
 from barberpole.plugins import load_plugins
 from barberpole.reasons import sentence
@@ -52,12 +54,15 @@ class Verification:
         return {"pass": self.passed, "reasons": failed, "checks": [c.name for c in self.checks], **figures}
 
 
-def verify(log: Log, calibration: Calibration) -> Verification:
-    """Hold a log against a calibration. Raises InputError if the board ran another model, or nothing can be checked."""
+def verify(log: Log, calibration: Calibration, stream: LogStream | None = None) -> Verification:
+    """Hold a log against a calibration. `stream`: of a long log, of which `log` is then a sample.
+
+    Raises InputError if the board ran another model, or nothing can be checked.
+    """
     fitted = from_calibration(calibration)
     checks = [*_identity(log, calibration), *_selfcal(log, calibration, fitted)]
     if not coils_driven(log):
-        checks += _readings(log, calibration, fitted)
+        checks += _readings(log, calibration, fitted, stream)
     if not checks:
         got = "a coil run without its verdict"
         raise InputError(
@@ -126,15 +131,16 @@ def coils_driven(log: Log) -> bool:
     return currents is not None and bool(np.max(np.abs(currents)) > DRIVEN_MA)
 
 
-def _readings(log: Log, calibration: Calibration, fitted: Fitted) -> Iterator[Check]:
+def _readings(log: Log, calibration: Calibration, fitted: Fitted, stream: LogStream | None) -> Iterator[Check]:
     seen = _with_sensor(observations(log), fitted, log)
     require_columns(seen, fitted.model.effects, load_plugins(calibration.model.plugins))
     magnitude = float(calibration.model.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     problem = Problem(fitted.model, seen, magnitude)
+    problems = (problem,) if stream is None else Streamed(stream, problem).problems()
     if problem.vector:
-        yield _against_field(problem, fitted, calibration)
+        yield _against_field(problems, fitted, calibration)
     else:
-        yield _against_norm(problem, fitted, calibration)
+        yield _against_norm(problems, fitted, calibration)
 
 
 def _with_sensor(seen: Observations, fitted: Fitted, log: Log) -> Observations:
@@ -157,8 +163,13 @@ def gains_in_force(log: Log) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def _against_field(problem: Problem, fitted: Fitted, calibration: Calibration) -> Check:
-    rms = float(np.sqrt(np.mean(problem.residual(fitted.p) ** 2)))
+def _against_field(problems: Iterable[Problem], fitted: Fitted, calibration: Calibration) -> Check:
+    total, count = 0.0, 0
+    for problem in problems:
+        for rows in problem.chunks():
+            residual = problem.residual_of(fitted.p, rows)
+            total, count = total + float(np.vdot(residual, residual)), count + residual.size
+    rms = float(np.sqrt(total / count))
     before = calibration.residual.rms_lsb
     return Check(
         "residual",
@@ -168,21 +179,31 @@ def _against_field(problem: Problem, fitted: Fitted, calibration: Calibration) -
     )
 
 
-def _against_norm(problem: Problem, fitted: Fitted, calibration: Calibration) -> Check:
-    field = np.concatenate(
-        [fitted.model.invert(problem.seen.y[:, r], fitted.p, problem.seen.at.take(r)) for r in problem.chunks()], axis=1
-    )
-    norm = np.linalg.norm(field, axis=0)
-    known = problem.seen.b_mag if problem.seen.b_mag is not None else float(np.mean(norm))
-    percent = float(100.0 * np.sqrt(np.mean((norm / known - 1.0) ** 2)))
+def _against_norm(problems: Iterable[Problem], fitted: Fitted, calibration: Calibration) -> Check:
+    percent, mean_ut = _scatter(problems, fitted)
     before = _norm_percent(calibration)
     return Check(
         "norm",
         percent <= WORSE * before,
         f"|B| scatters by {percent:.3g} % about its mean; the calibration left {before:.3g} %, "
         f"{WORSE:g} times that is allowed.",
-        {"rms_norm_percent": percent, "calibration_norm_percent": before, "mean_norm_ut": float(np.mean(norm))},
+        {"rms_norm_percent": percent, "calibration_norm_percent": before, "mean_norm_ut": mean_ut},
     )
+
+
+def _scatter(problems: Iterable[Problem], fitted: Fitted) -> tuple[float, float]:
+    """RMS of |B|/K - 1 in %, K being the magnitude logged or else the mean, and the mean of |B| in µT."""
+    n, apart, apart2, relative2, reference, known = 0, 0.0, 0.0, 0.0, 0.0, False
+    for problem in problems:
+        seen, reference, known = problem.seen, problem.magnitude_ut, problem.seen.b_mag is not None
+        for rows in problem.chunks():
+            norm = np.linalg.norm(fitted.model.invert(seen.y[:, rows], fitted.p, seen.at.take(rows)), axis=0)
+            n += norm.size
+            apart, apart2 = apart + float(np.sum(norm - reference)), apart2 + float(np.sum((norm - reference) ** 2))
+            relative2 += float(np.sum((norm / problem.magnitude(rows) - 1.0) ** 2))
+    mean = reference + apart / n
+    scatter = relative2 / n if known else max(apart2 / n - (apart / n) ** 2, 0.0) / mean**2
+    return float(100.0 * np.sqrt(scatter)), mean
 
 
 def _norm_percent(calibration: Calibration) -> float:

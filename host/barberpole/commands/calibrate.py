@@ -11,8 +11,8 @@ from barberpole.board import load_sensor
 from barberpole.calibrating import calibration_of, with_selfcal
 from barberpole.calibration import Calibration, read_calibration, write_calibration
 from barberpole.calibration_tables import PriorTable, Step
+from barberpole.commands import big, show
 from barberpole.commands import methods as published
-from barberpole.commands import show
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
 from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut, with_magnitude
 from barberpole.diagnose import compare as compare_fit
@@ -22,6 +22,7 @@ from barberpole.errors import BarberpoleError, InputError, must
 from barberpole.fit.answer import fit_json
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.log import Log, read_log, write_log
+from barberpole.log_stream import LogStream
 from barberpole.modelfile import ModelFile, add_effect, read_model, remove_effect, write_model
 from barberpole.observations import Observations, observations
 from barberpole.plugins import load_plugins
@@ -63,7 +64,7 @@ def fit(
         raise InputError(must("fit", "given --model or --method", "neither"))
     if prior and (method or not model):
         raise InputError(must("--prior", "used with --model", "--method"))
-    data = read_log(log)
+    data, stream = (read_log(log), None) if method or prior else _read(log, model)
     known_ut = magnitude_ut(data, magnitude, place, date)
     answer = published.run(data, method, model, sensor, against, known_ut) if method else None
     if answer and answer.fit is None:
@@ -75,7 +76,7 @@ def fit(
     elif prior:
         found, file, stated = _by_prior(data, model, sensor, known_ut, prior, lot)
     else:
-        found, file = _by_model(data, model, sensor, known_ut)
+        found, file = _by_model(data, model, sensor, known_ut, stream)
     calibration = replace(calibration_of(found, data, file, method or "fit"), prior=stated)
     run = read_log(selfcal).selfcal if selfcal else data.selfcal
     if run is not None:
@@ -91,10 +92,23 @@ def fit(
         published.show_values(answer)
 
 
-def _by_model(data: Log, model: str, sensor: str | None, known_ut: float | None) -> tuple[Fit, ModelFile]:
+def _read(log: Path, model: str) -> tuple[Log, LogStream | None]:
+    """The log, or a sample of a long one with the stream that it stands for."""
+    file = read_model(model)
+    return big.read(log, file, load_plugins(file.plugins))
+
+
+def _by_model(
+    data: Log, model: str, sensor: str | None, known_ut: float | None = None, stream: LogStream | None = None
+) -> tuple[Fit, ModelFile]:
     file = with_magnitude(read_model(model), known_ut)
+    if stream is not None:
+        from barberpole.fit.stream import fit_stream
+
+        with progress("fit", unit="rows") as tick:
+            return fit_stream(stream, file, _sensor_of(data, file, sensor), load_plugins(file.plugins), tick), file
     seen, extra = _seen(data, file, sensor)
-    with progress("fit", None) as tick:
+    with progress("fit", unit="rows") as tick:
         return fit_observations(seen, file, extra, tick), file
 
 
@@ -129,10 +143,9 @@ def compare(
     as_json: bool = AS_JSON,
 ) -> None:
     """Hold the model against the measurement: residual by axis and against every covariate."""
-    data, file = read_log(log), read_model(model)
-    seen, extra = _seen(data, file, sensor)
-    made = fit_observations(seen, file, extra)
-    found = compare_fit(made, extra=extra)
+    data, stream = _read(log, model)
+    made, file = _by_model(data, model, sensor, stream=stream)
+    found = compare_fit(made, extra=load_plugins(file.plugins))
     if output:
         from barberpole.report.comparison import write_comparison  # here: drawing is slow to load
 
@@ -157,7 +170,7 @@ def diagnose(
     bad = 0
     for path in logs:
         try:
-            data = read_log(path)
+            data = big.read(path, file, extra)[0]  # of a long log a sample, which is searched in its place
             found = diagnose_log(data, file, rest, _sensor_of(data, file, sensor), extra)
         except BarberpoleError as error:
             if len(logs) == 1:
@@ -231,8 +244,9 @@ def verify(
     as_json: bool = AS_JSON,
 ) -> int:
     """Is this board still what the calibration says? Exit 1 if not."""
-    data = read_log(log)
-    found = verify_log(data, read_calibration(calibration))
+    said = read_calibration(calibration)
+    data, stream = big.read(log, said.model, load_plugins(said.model.plugins))
+    found = verify_log(data, said, stream)
     if as_json:
         print_json(found.to_json())
     else:

@@ -7,8 +7,18 @@ from typing import Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from rich.table import Table
+from rich.text import Text
 
 from barberpole.numbers import strict
 
@@ -38,16 +48,25 @@ def notes(sentences: tuple[str, ...]) -> None:
         ERR.print(f"note: {sentence}", style="dim", soft_wrap=True)
 
 
+class _Rate(ProgressColumn):
+    """What is done a second, of work that is counted in a unit."""
+
+    def render(self, task: Task) -> Text:
+        unit = task.fields.get("unit")
+        return Text(f"{task.speed or 0.0:,.0f} {unit}/s" if unit else "")
+
+
 @contextmanager
-def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """A progress bar on stderr while the work runs; call what it yields with the amount just done."""
+def progress(what: str, total: int | None = None, unit: str = "") -> Iterator[Callable[[int], None]]:
+    """A progress bar on stderr while the work runs; call what it yields with the amount just done, in `unit`."""
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
+        _Rate(),
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=ERR, transient=True, disable=not ERR.is_terminal) as bar:
-        task = bar.add_task(what, total=total)
+        task = bar.add_task(what, total=total, unit=unit)
         yield lambda done: bar.advance(task, done)

@@ -18,9 +18,7 @@ MANY = 12  # patterns shown to a person; --json has all
 
 def fit_tables(fit: Fit, output: Path | None) -> None:
     """Parameters with their uncertainty, and the residual."""
-    shown = table(
-        f"{fit.problem.n} readings, reference: {fit.problem.seen.reference}", "parameter", "value", "± 1 σ", "unit"
-    )
+    shown = table(f"{fit.n} readings, reference: {fit.problem.seen.reference}", "parameter", "value", "± 1 σ", "unit")
     for name, param, value, error, free in zip(
         fit.model.names, fit.model.params, fit.p, fit.stderr, fit.free, strict=True
     ):

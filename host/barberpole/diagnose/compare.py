@@ -45,18 +45,21 @@ class Comparison:
 
 
 def compare(fit: Fit, noise: Noise | None = None, extra: Sequence[Effect] = ()) -> Comparison:
-    """What is left of the readings under a fit. `noise`: of the sensor at rest, else taken from the residual."""
+    """What is left of the readings under a fit. `noise`: of the sensor at rest, else taken from the residual.
+
+    Of a log that was read piece by piece, patterns, curves, spectrum and sphere are those of a sample of it.
+    """
     evidence = examine(fit, None, None, extra)
     ground = evidence.ground
     axes = ground.axes
     noise = evidence.background() if noise is None else noise
     evidence = evidence.under(whitening(noise, fit.problem.n, ground.normal))
     return Comparison(
-        n=fit.problem.n,
+        n=fit.n,
         rms_lsb=fit.rms_lsb,
         rms_ut=fit.rms_ut(),
         rms_norm_percent=fit.rms_norm_percent(),
-        rms_by_axis_lsb={a: float(np.sqrt(np.mean(r**2))) for a, r in zip(axes, ground.residual, strict=True)},
+        rms_by_axis_lsb=dict(zip(axes, fit.figures.rms_by_channel.tolist(), strict=True)),
         noise_lsb=noise.rms(fit.problem.n),
         patterns=tuple(patterns(evidence)),
         curves=tuple(curves(evidence)),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,10 +11,11 @@ from barberpole.errors import InputError
 from barberpole.fit import observability
 from barberpole.fit.affine import moments
 from barberpole.fit.ellipsoid import coverage_message
-from barberpole.fit.gram import Gram, heldout_rms
+from barberpole.fit.gram import Gram, Tick, heldout_rms
 from barberpole.fit.residual import Problem
-from barberpole.fit.solve import Solution, minimise
+from barberpole.fit.solve import Measured, Solution, minimise
 from barberpole.fit.start import Linear, linear_part, start_values
+from barberpole.fit.whole import Figures, figures
 from barberpole.log import Log
 from barberpole.model import Model, compose
 from barberpole.modelfile import ModelFile
@@ -23,7 +25,7 @@ OUTLIER = 4.0  # robust standard deviations; one normal reading in 16 000 lies b
 MAD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
 GIANT = 20.0  # the same at the start of a fit, whose residual is not all noise yet
 OUTLIER_PASSES = 4
-THIN = 2.5  # residuals: readings this flat follow any surface, and a fit bends it round their noise
+THIN = 2.0  # residuals: readings this flat follow any surface, and a fit bends it round their noise
 NOMINAL_MAGNITUDE_UT = 50.0  # where only its constancy is known; the scale is then relative to it
 
 
@@ -33,6 +35,7 @@ class Fit:
 
     rms_lsb over all residuals; heldout_rms_lsb over stretches fitted without them; unobservable: names of parameters
     that this log cannot determine, which stay at their null. held: names of parameters that were not to be fitted.
+    whole: where the log was read piece by piece; the problem is then that of a sample of it.
     """
 
     problem: Problem
@@ -45,6 +48,7 @@ class Fit:
     setups: dict[str, Setup] = field(default_factory=dict)
     extra: tuple[Effect, ...] = ()
     held: frozenset[str] = frozenset()
+    whole: Figures | None = None
 
     @property
     def model(self) -> Model:
@@ -82,19 +86,23 @@ class Fit:
             [self.model.invert(seen.y[:, r], self.p, seen.at.take(r)) for r in self.problem.chunks()], axis=1
         )
 
+    @property
+    def n(self) -> int:
+        """Samples that were fitted."""
+        return self.problem.n if self.whole is None else self.whole.n
+
+    @cached_property
+    def figures(self) -> Figures:
+        """How well it does on the whole log."""
+        return self.whole or figures((self.problem,), self.p)
+
     def rms_ut(self) -> float:
         """RMS error of the calibrated field: by component against a known field, else of the magnitude."""
-        seen, field = self.problem.seen, self.field()
-        if seen.b_ut is not None:
-            return float(np.sqrt(np.mean((field - seen.b_ut) ** 2)))
-        return float(np.sqrt(np.mean((np.linalg.norm(field, axis=0) - self.problem.magnitude(slice(None))) ** 2)))
+        return self.figures.rms_ut
 
     def rms_norm_percent(self) -> float | None:
         """RMS of |B|/K - 1 in %, for scalar references."""
-        if self.problem.vector:
-            return None
-        ratio = np.linalg.norm(self.field(), axis=0) / self.problem.magnitude(slice(None))
-        return float(100.0 * np.sqrt(np.mean((ratio - 1.0) ** 2)))
+        return self.figures.rms_norm_percent
 
 
 def fit_log(log: Log, file: ModelFile, extra: Sequence[Effect] = (), tick: Callable[[int], None] | None = None) -> Fit:
@@ -200,13 +208,13 @@ def fit_problem(
     elif problem.believed is None:
         problem = replace(problem, believed=believable(problem.residual(p), GIANT))  # else they lead the fit astray
     fitted = np.array([name not in held for name in problem.model.names])
-    solution = _determined(problem, p, fitted, tick)
+    solution = determined(problem, p, fitted, tick)
     for _ in range(OUTLIER_PASSES if problem.model.loss else 0):
         believed = believable(problem.residual(solution.p))
         if problem.believed is not None and np.array_equal(believed, problem.believed):
             break
         problem = replace(problem, believed=believed)
-        solution = _determined(problem, solution.p, solution.free, tick)
+        solution = determined(problem, solution.p, solution.free, tick)
     if not problem.vector and problem.thinnest < THIN * solution.gram.rms():
         raise InputError(coverage_message(problem.seen.y))
     cov = observability.covariance(solution.gram, solution.free)
@@ -225,8 +233,8 @@ def _freeze_undetermined(model: Model, solution: Solution, keep: np.ndarray) -> 
         keep[worst] = False
 
 
-def _determined(problem: Problem, p: np.ndarray, free: np.ndarray, tick=None) -> Solution:
-    """Freeze first what is dependent, then what is undetermined, at its null."""
+def determined(problem: Measured, p: np.ndarray, free: np.ndarray, tick: Tick = None) -> Solution:
+    """Minimise from p. Freeze first what is dependent, then what is undetermined, at its null."""
     null = problem.model.null
     # a singular start leads a fit astray
     first = problem.gram(p, 0.0, tick)

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from barberpole.chain import solve3
 from barberpole.effects import Effect, find_effect
 from barberpole.errors import InputError, must
 from barberpole.fit import observability
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, Fit, believable, require_columns, setup_of, with_reference
-from barberpole.fit.gram import Gram, accumulate
+from barberpole.fit.gram import Gram
 from barberpole.fit.residual import Problem
 from barberpole.fit.start import Linear
 from barberpole.model import compose
@@ -66,10 +65,10 @@ def fit_with_prior(seen: Observations, file: ModelFile, prior: Prior, extra: Seq
     problem = Problem(model, seen, magnitude)
     mean = np.array([prior.values.get(n, (first, 0.0))[0] for n, first in zip(model.names, model.first, strict=True)])
     weight = np.array([prior.values[n][1] ** -2.0 if n in prior.values else 0.0 for n in model.names])
-    found = _descend(_OnSphere(problem), mean, weight)
+    found = _descend(problem, mean, weight)
     if model.loss:
         problem = replace(problem, believed=believable(problem.residual(found.p)))
-        found = _descend(_OnSphere(problem), mean, weight)
+        found = _descend(problem, mean, weight)
     free, gram = found.free, found.gram
     covariance = np.zeros((free.size, free.size))
     covariance[np.ix_(free, free)] = found.variance * _inverse(gram.jj.sum(axis=0)[np.ix_(free, free)])
@@ -86,30 +85,6 @@ def _linear(prior: Prior, seen: Observations, magnitude: float) -> Linear:
 
 
 @dataclass(frozen=True)
-class _OnSphere:
-    """A problem with derivatives taken at the field brought to its known magnitude; `accumulate` takes it as one."""
-
-    problem: Problem
-
-    def __getattr__(self, name: str):
-        return getattr(self.problem, name)
-
-    def linearise(self, p: np.ndarray, rows: slice, sigma: float) -> tuple[np.ndarray, np.ndarray]:
-        """As `Problem.linearise`."""
-        problem = self.problem
-        residual, d_p = problem.linearise(p, rows, sigma)
-        if problem.vector or problem.remembers:
-            return residual, d_p
-        seen, at = problem.seen, problem.seen.at.take(rows)
-        field = problem.model.invert(seen.y[:, rows], p, at)
-        norm = np.linalg.norm(field, axis=0)
-        _, columns, slope = problem.model.linearise(field * (problem.magnitude(rows) / norm), p, at, field_too=True)
-        normal = solve3(np.swapaxes(np.asarray(slope), 0, 1), field / norm)
-        columns = np.einsum("in,ikn->kn", normal / np.linalg.norm(normal, axis=0), columns)[None]
-        return residual, columns if problem.believed is None else columns * problem.believed[:, None, rows]
-
-
-@dataclass(frozen=True)
 class _State:
     """Where a descent is: the normal equations with the prior among them, and the variance of the noise."""
 
@@ -120,14 +95,14 @@ class _State:
     converged: bool
 
 
-def _descend(problem: _OnSphere, mean: np.ndarray, weight: np.ndarray) -> _State:
+def _descend(problem: Problem, mean: np.ndarray, weight: np.ndarray) -> _State:
     p, free = mean.copy(), np.ones(mean.size, bool)
     first = np.diff(problem.residual(p), axis=1)
     variance = float(np.mean(first**2)) / 2.0 or 1.0  # far from the solution only neighbours tell the noise
     for _ in range(PASSES):
         noise, converged = variance, False
         sigma = 0.0 if problem.vector else float(np.sqrt(noise))  # a scalar reference's field is lengthened by it
-        gram = accumulate(problem, p, sigma)
+        gram = problem.gram(p, sigma)
         if not np.isfinite(gram.cost):
             raise InputError("the log must stay within what the model can invert; got readings beyond it at the prior")
         for _ in range(STEPS):
@@ -172,7 +147,7 @@ def _moved(problem, p, step, gram, mean, weight, sigma) -> tuple[np.ndarray, Gra
     here = cost(p, gram)
     for _ in range(HALVINGS):
         trial = np.clip(p + step, lower, upper)
-        there = accumulate(problem, trial, sigma)
+        there = problem.gram(trial, sigma)
         if np.isfinite(there.cost) and cost(trial, there) <= here * (1.0 + (0.0 if problem.vector else UPHILL)):
             return trial, there
         step = 0.5 * step

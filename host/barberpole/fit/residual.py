@@ -163,12 +163,14 @@ class Problem:
 
     def residual(self, p: np.ndarray) -> np.ndarray:
         """All residuals (m, n) in LSB, outliers too."""
+        return np.concatenate([self.residual_of(p, rows) for rows in self.chunks()], axis=1)
+
+    def residual_of(self, p: np.ndarray, rows: slice) -> np.ndarray:
+        """Those (m, k) of some samples."""
         seen = self.seen
         if seen.b_ut is None:
-            return np.concatenate([self._distance(p, rows)[0] for rows in self.chunks()])[None]
-        field = seen.b_ut
-        parts = [seen.y[:, r] - self.model.predict(field[:, r], p, seen.at.take(r)) for r in self.chunks()]
-        return np.concatenate(parts, axis=1)
+            return self._distance(p, rows)[0][None]
+        return seen.y[:, rows] - self.model.predict(seen.b_ut[:, rows], p, seen.at.take(rows))
 
 
 def cofactors(m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
