@@ -76,7 +76,8 @@ def dask(address: str) -> Iterator[Pool]:
         got = " ".join(str(error).split())[:120]
         raise InputError(must("--dask", "the address of a running scheduler, tcp://host:8786", got, address)) from None
     try:
-        width = max(sum(dict(client.nthreads()).values()), 1)
+        threads: Any = client.nthreads()  # of each worker, here where the client is not asynchronous
+        width = max(sum(threads.values()), 1)
         yield Pool(lambda: client.get_executor(pure=False), lambda pool: pool.shutdown(False), width)
     finally:
         client.close()

@@ -107,7 +107,8 @@ def between(v: np.ndarray, s: np.ndarray, wanted: float) -> float:
     top = float(np.ptp(v)) + float(np.max(s))
     while _q(v, s, top) > wanted:
         top *= 4.0
-    return float(brentq(lambda tau: _q(v, s, tau) - wanted, 0.0, top, xtol=1e-6 * top))
+    found: Any = brentq(lambda tau: _q(v, s, tau) - wanted, 0.0, top, xtol=1e-6 * top)
+    return float(found)
 
 
 def _q(v: np.ndarray, s: np.ndarray, tau: float) -> float:
