@@ -19,6 +19,7 @@ from barberpole.errors import InputError, must
 
 MAX_HARMONICS = 5
 PERIOD_LSB = 64.0
+MONOTONIC = 0.15  # of its period: a ripple of a larger amplitude than 1/(2 pi) would turn codes around
 EXACT = 1e-4  # how far a fit may move the period: a power of two is one
 NEWTON_STEPS = 30
 DONE = 1e-13
@@ -40,7 +41,7 @@ def _ripple(setup: Setup):
         raise InputError(must("setting harmonics", f"a whole number from 1 to {MAX_HARMONICS}", repr(harmonics)))
     found = []
     for h in range(1, harmonics + 1):
-        size = {"typical": 0.01 * period / h, "lower": -0.1 * period / h, "upper": 0.1 * period / h}
+        size = {"typical": 0.01 * period / h, "lower": -MONOTONIC * period / h, "upper": MONOTONIC * period / h}
         found += [*per_axis("LSB", prefix=f"sin{h}_", **size), *per_axis("LSB", prefix=f"cos{h}_", **size)]
     low, high = period * (1.0 - EXACT), period * (1.0 + EXACT)
     return *found, Param("period", "LSB", period, low, high, None, period, inner=True)
