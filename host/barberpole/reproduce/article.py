@@ -6,15 +6,16 @@ import numpy as np
 
 from barberpole.board import load_sensor
 from barberpole.characterise.angles import noise_angle_deg
-from barberpole.characterise.response import bandwidth_hz, first_order
+from barberpole.characterise.response import bandwidth_hz, first_order, response
 from barberpole.characterise.simulate import noise, sensitivity_nt, white_and_corner
 from barberpole.characterise.sine import fit_histogram, fit_sine
-from barberpole.methods.linear import linear_model
+from barberpole.characterise.temperature import thermometer
+from barberpole.methods.linear import decompose, linear_model
 from barberpole.methods.polynomial import choose, polynomial_model
 from barberpole.methods.turn_over import turn_over
 from barberpole.reproduce.row import Row
 from barberpole.sensor import Digital
-from barberpole.trajectory.programs import SINE_PEAK_TO_PEAK_UT, lin_60000
+from barberpole.trajectory.programs import FREQUENCIES_HZ, SINE_PEAK_TO_PEAK_UT, lin_60000
 
 _row = partial(Row, "article")
 
@@ -31,6 +32,7 @@ LARGEST_OFFSET_NT = 53_700.0  # 3.2
 THEMIS_RELATIVE, THEMIS_HZ = 0.70, 60.0  # 3.1
 RELATIVE_AT_61_HZ, FASTEST_HZ = (0.90, 0.97), 61.0  # 3.1
 ON_AXIS_PERCENT = 80.0  # 3.1, fig. 5: "up to"
+C_PER_LSB = 0.125  # of the LIS3MDL, data sheet: 8 LSB/K
 TURN_RESIDUAL_NT = 2.5  # 2.4
 SECONDS = 300
 
@@ -39,8 +41,8 @@ def rows() -> list[Row]:
     """All of them, in the order of the article."""
     sensors = {name: _digital(name) for name in KINDS}
     return [
-        *_turn_over(), *_amplitude(), *_polynomial(), *_bandwidth(), *_drift(sensors), *_cold(sensors),
-        *_offset(sensors), *_noise(sensors), *_angles(sensors),
+        *_linear(), *_turn_over(), _thermometer(), *_amplitude(), *_polynomial(), *_bandwidth(), _relative(),
+        *_drift(sensors), *_cold(sensors), *_offset(sensors), *_noise(sensors), *_angles(sensors),
     ]  # fmt: skip
 
 
@@ -49,6 +51,44 @@ def _digital(name: str) -> Digital:
     if digital is None:
         raise LookupError(f"{name} has no table [sensor.digital]")
     return digital
+
+
+def _linear() -> list[Row]:
+    """Eq. 1-3: nine parameters of M = R W S from LIN-60000 under the printed noise of the HMC5983."""
+    rng, digital = np.random.default_rng(7), _digital("hmc5983")
+    step = 1e-3 * np.array(digital.sensitivity_nt_per_lsb)
+    about, yz = np.radians(20.0), np.radians(MISALIGNED_DEG)
+    turn = np.array([[np.cos(about), -np.sin(about), 0], [np.sin(about), np.cos(about), 0], [0, 0, 1]])
+    true = turn @ np.array([[1, 0, 0], [0, 1, -np.sin(yz)], [0, 0, np.cos(yz)]]) * step
+    field = np.repeat(lin_60000().field_ut, round(25.0 * digital.rate_hz), axis=0).T
+    y = np.linalg.solve(true, field) + 1e-3 * noise(digital, field.shape[1], rng) / step[:, None]
+    parts = decompose(linear_model(y, field).matrix)
+    how = "simulated: LIN-60000 under the printed noise, with the printed sensitivity and misalignment"
+    angle, what = float(parts.angle_deg[2]), "sensitivity by the linear model"
+    return [
+        *(_row("eq. 1-3", f"{what}, {axis}", float(1000 * s), float(1000 * f), "nT/LSB", how)
+          for axis, s, f in zip("xyz", step, parts.sensitivity, strict=True)),
+        _row("eq. 3, 3.4", "misalignment y-z by the linear model", MISALIGNED_DEG, angle, "°", how),
+    ]  # fmt: skip
+
+
+def _thermometer() -> Row:
+    """Fig. 4: a chip's thermometer of whole counts against the box while it cools from 70 °C."""
+    temp = 25.0 + 45.0 * np.exp(-np.linspace(0.0, 3.0, 400))
+    counts = np.round((temp - 25.0) / C_PER_LSB)
+    found = thermometer(counts, temp)
+    remark = f"simulated: counts of {C_PER_LSB:g} K, cooling from 70 °C; left over {1000 * found.rms_c:.0f} mK rms"
+    return _row("fig. 4", "temperature per count of the internal sensor", None, found.c_per_lsb, "K/LSB", remark)
+
+
+def _relative() -> Row:
+    """Fig. 6: five sensors of three axes, bandwidths between those that 90 and 97 % at 61 Hz stand for."""
+    low, high = (bandwidth_hz(FASTEST_HZ, r) for r in RELATIVE_AT_61_HZ)
+    bands = np.linspace(low, high, 15)
+    found = response(FREQUENCIES_HZ, np.array([first_order(np.array(FREQUENCIES_HZ), b) for b in bands]))
+    remark = f"± {found.stderr[-1]:.3f} over fifteen axes, first order; published: the middle of the printed 90 to 97 %"
+    middle = 0.5 * sum(RELATIVE_AT_61_HZ)
+    return _row("fig. 6", "mean relative amplitude at 61 Hz", middle, float(found.relative[-1]), "", remark)
 
 
 def _turn_over() -> list[Row]:

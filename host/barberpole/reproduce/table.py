@@ -10,6 +10,7 @@ from barberpole.reproduce import (
     thesis_calibration,
     thesis_electronics,
     thesis_law,
+    thesis_scalar,
 )
 from barberpole.reproduce.row import Row
 
@@ -26,6 +27,7 @@ def all_rows(power_ups: int = repeatability.POWER_UPS) -> list[Row]:
     return [
         *thesis_law.rows(),
         *thesis_electronics.rows(),
+        *thesis_scalar.rows(),
         *thesis_calibration.rows(),
         *repeatability.rows(power_ups),
         *thesis_apparatus.rows(),
