@@ -4,16 +4,14 @@ from array import array
 
 from micropython import const
 
-import bp_fixed as fixed
+from bp_frame import HEAD, Frame
+from bp_native import fixed
 
 ROW_FORMAT = "<qiiiiiiffffffff"  # what this file can fill: time, six sums, temperature, currents, supply, field
-_BODY = const(69)  # type, sequence, row, check sum
-_TIME = const(3)
-_SUMS = const(11)
+_ROW = const(64)
+_SUMS = const(11)  # where they stand in the body, after head and time
 _FLOATS = const(35)
-_CRC = const(67)
 _OFFSET = const(0x100000)  # LSB, an eighth of the converter's scale: the largest that is taken off in fixed point
-_ALPHABET = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
 
 
 class FastRow:
@@ -23,11 +21,7 @@ class FastRow:
         self._registers = array("i", hot.REGISTERS)
         self._offsets = array("i", bytearray(24))
         self._limits = hot.LOW + hot.HIGH
-        self._body = bytearray(_BODY)
-        self._body[0] = kind
-        self._text = bytearray(2 + 4 * _BODY // 3)
-        self._text[0] = 36  # "$"
-        self._text[-1] = 10
+        self._frame = Frame(kind, _ROW)
         self.ready = False
 
     def put_in_force(self, compensator):  # today's gains, offsets and shift; not ready where they are out of range
@@ -38,25 +32,29 @@ class FastRow:
             if not abs(offset_lsb) < _OFFSET:
                 return
             self._offsets[i] = round(offset_lsb * (self._samples << hot.SHIFTS[2 * i]))
-        given = compensator.gain + (compensator.shift_ut if hot.SHIFTED else ())
+        given = tuple(compensator.gain) + (tuple(compensator.shift_ut) if hot.SHIFTED else ())
         if not all(low <= value <= high for value, (low, high) in zip(given, hot.SLOW_BOX)):
             return
         for value, register, per_one in zip(hot.slow(*given), hot.SLOW, hot.SLOW_PER_ONE):
             self._registers[register] = round(value * per_one)
         self.ready = True
 
-    def frame(self, sums, limbs, sequence):  # the line of a row, None where it lies outside; sums: array("i") of 11
-        hot, registers, body = self._hot, self._registers, self._body
+    def line(self, sums, limbs, sequence):  # of a row, None where it lies outside; sums: array("i") of 11
+        hot, registers, body = self._hot, self._registers, self._frame.body
         if fixed.take(sums, self._offsets, hot.SHIFTS, hot.INPUTS, self._limits, registers):
             return None
         fixed.run(hot.CODE, hot.COUNT, registers)
-        body[1] = sequence & 0xFF
-        body[2] = sequence >> 8
-        fixed.copy(limbs, 8, body, _TIME)
+        fixed.copy(limbs, 8, body, HEAD)
         fixed.copy(sums, 24, body, _SUMS)
         fixed.floats(registers, hot.OUTPUTS, hot.EXPONENTS, 8, body, _FLOATS)
-        crc = fixed.crc16(body, _CRC)
-        body[_CRC] = crc & 0xFF
-        body[_CRC + 1] = crc >> 8
-        fixed.base64(body, _BODY, self._text, 1, _ALPHABET)
-        return self._text
+        return self._frame.sealed(sequence)
+
+
+def fast_row(board, calibration, kind, row_format):  # a FastRow, None where this build or this processor has none
+    if fixed is None or calibration.PATH != "viper" or row_format != ROW_FORMAT:
+        return None
+    try:
+        import bp_hot
+    except ImportError:
+        return None
+    return FastRow(bp_hot, board.SAMPLES_PER_HALF, kind) if bp_hot.CALIBRATION == calibration.CALIBRATION else None

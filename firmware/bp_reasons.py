@@ -21,6 +21,8 @@ OUT_OF_RANGE = const(15)
 STORE_FAILED = const(16)
 FLIP_STOPPED = const(17)
 SAMPLES_LOST = const(18)
+WATCHDOG = const(19)
+FACTORY_RESET = const(20)
 
 # name and sentence by code
 TABLE = (
@@ -43,6 +45,8 @@ TABLE = (
     ("store_failed", "The flash did not take a file: what was in force stays in force."),
     ("flip_stopped", "The break input has stopped the flip pulses."),
     ("samples_lost", "Flip cycles went by unread: a pause was longer than the ring of samples is deep."),
+    ("watchdog", "The watchdog restarted the board: its program had stood still."),
+    ("factory_reset", "A host put the factory calibration in force."),
 )
 
 

@@ -9,33 +9,20 @@ import struct
 
 from micropython import const
 
+from bp_native import crc16
+
 HEADER = const(72)  # "H": JSON
 ROW = const(68)  # "D": packed as the header's columns say
 EVENT = const(69)  # "E": JSON
 RUN = const(84)  # "T": JSON, a coil run begins
 POINT = const(80)  # "P": packed as POINT_FORMAT
 RESULT = const(83)  # "S": JSON, the verdict on the run
+ANSWER = const(65)  # "A": JSON, to a command
 FORMAT = const(1)
 
 # index; ux uy uz in trajectory units; SET and RESET averages in LSB; coil currents in mA; temperature in degC
 POINT_FORMAT = "<hfffffffffffff"
 POINT_BYTES = const(54)
-
-_CRC_NIBBLES = (
-    b"\x00\x00\x10\x21\x20\x42\x30\x63\x40\x84\x50\xa5\x60\xc6\x70\xe7"
-    b"\x81\x08\x91\x29\xa1\x4a\xb1\x6b\xc1\x8c\xd1\xad\xe1\xce\xf1\xef"
-)
-
-
-def crc16(data):  # CCITT, polynomial 0x1021, start 0xFFFF, four bits at a time
-    crc = 0xFFFF
-    table = _CRC_NIBBLES
-    for byte in data:
-        i = (crc >> 12 ^ byte >> 4) * 2
-        crc = (crc << 4 & 0xFFFF) ^ (table[i] << 8 | table[i + 1])
-        i = (crc >> 12 ^ byte & 15) * 2
-        crc = (crc << 4 & 0xFFFF) ^ (table[i] << 8 | table[i + 1])
-    return crc
 
 
 class Writer:
@@ -46,10 +33,34 @@ class Writer:
     def frame(self, kind, payload):
         body = struct.pack("<BH", kind, self._sequence) + payload
         self._sequence = (self._sequence + 1) & 0xFFFF
-        self._write(b"$" + binascii.b2a_base64(body + struct.pack("<H", crc16(body))))
+        self._write(b"$" + binascii.b2a_base64(body + struct.pack("<H", crc16(body, len(body)))))
+
+    def row(self, fast, sums, limbs):  # by a bp_fast.FastRow; False where it lies outside what that can do
+        line = fast.line(sums, limbs, self._sequence)
+        if line is None:
+            return False
+        self.line(line)
+        return True
+
+    def again(self, frame):  # a bp_frame.Frame
+        self.line(frame.sealed(self._sequence))
+
+    def line(self, text):
+        self._sequence = (self._sequence + 1) & 0xFFFF
+        self._write(text)
 
     def json(self, kind, fields):
         self.frame(kind, json.dumps(fields).encode())
 
     def event(self, t_s, code, name, text, values):
         self.json(EVENT, {"t_s": t_s, "code": code, "name": name, "text": text, "values": values})
+
+
+def content(line):  # the payload of a frame that this board wrote, None where it is not whole
+    try:
+        body = binascii.a2b_base64(line.strip()[1:])
+    except ValueError:
+        return None
+    if len(body) < 5 or struct.unpack("<H", body[-2:])[0] != crc16(body, len(body) - 2):
+        return None
+    return body[3:-2]

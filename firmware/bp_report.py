@@ -1,9 +1,11 @@
 # bp_report.py: header, events and verdict of a power-up as fields of JSON frames, and the file that keeps them.
+import json
 import struct
 
 import bp_board as board
 import bp_calibration as calibration
 import bp_compensate
+import bp_frame
 import bp_reasons as reasons
 import bp_records as records
 import bp_trajectory as trajectory
@@ -69,6 +71,21 @@ def verdict(codes, held, run):  # run: a bp_selfcal.Run, or None where there was
         fields["ambient_step_ut"] = run.solution.step_ut
         fields["temp_c"] = run.temp_c()
     return fields
+
+
+def figures(run):  # why a self-calibration was refused, in figures; for the log
+    if run is None:
+        return {}
+    found = {"current_ratio": run.current_ratio, "duration_s": run.duration_s}
+    if run.solution is not None:
+        found["gain"] = run.solution.gain
+        found["residual_ut"] = run.solution.residual_ut
+        found["ambient_step_ut"] = run.solution.step_ut
+    return found
+
+
+def again(kind, fields):  # a frame that can be said at any time without an allocation
+    return bp_frame.of_json(kind, json.dumps(fields).encode())
 
 
 def event(writer, t_s, code, detail=""):

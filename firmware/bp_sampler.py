@@ -7,6 +7,7 @@ from array import array
 from micropython import const
 
 import bp_reasons as reasons
+from bp_native import sum24
 
 SET = const(0)  # sums[SET + axis]
 RESET = const(3)
@@ -29,6 +30,7 @@ class Sampler:
         view = memoryview(self._raw)
         self._frames = tuple(view[at : at + FRAME_BYTES] for at in range(0, len(self._raw), FRAME_BYTES))
         self._old = bytearray(FRAME_BYTES)
+        self._found = array("i", bytearray(12))  # sum, smallest and largest
         self._next_us = time.ticks_us()
         self.sums = array("i", bytearray(4 * 11))
         self.mid_us = 0  # ticks of the last RESET pulse, the middle of the last cycle
@@ -41,6 +43,9 @@ class Sampler:
         for i in range(11):
             self.sums[i] = 0
         self.cycles = self.clipped = self._moving = 0
+
+    def stop(self):  # nothing runs by itself here
+        pass
 
     def fresh(
         self,
@@ -83,21 +88,10 @@ class Sampler:
             self.sums[i] += self._last_word(self._words[i - 3])
 
     def _sum_axis(self, axis, first):
-        raw = self._raw
-        clip = self._adc.clip
-        total, low, high = 0, clip, -clip
-        i, end, step = self._words[axis], len(raw), FRAME_BYTES
-        while i < end:  # a range with a step from elsewhere would be an object on the heap
-            word = raw[i] << 16 | raw[i + 1] << 8 | raw[i + 2]
-            if word & 0x800000:
-                word -= 0x1000000
-            total += word
-            if word < low:
-                low = word
-            if word > high:
-                high = word
-            i += step
-        self.sums[first + axis] += total
+        found = self._found
+        sum24(self._raw, self._words[axis], FRAME_BYTES, len(self._raw), found)
+        low, high, clip = found[1], found[2], self._adc.clip
+        self.sums[first + axis] += found[0]
         if low <= -clip or high >= clip:
             self.clipped |= 1 << axis
         if low < high:

@@ -16,6 +16,7 @@ _FILES = ("a.cal", "b.cal")
 _MAGIC = b"bpc1"
 _LAYOUT = "<4sI12s3f3f3ff"  # magic, seq, calibration, gain, shift, offset, temperature
 _BYTES = const(60)
+_NONE_THERE = const(2)  # ENOENT
 
 
 class Stored:  # what is in force
@@ -54,6 +55,18 @@ class Store:
             file.write(body + struct.pack("<I", binascii.crc32(body)))
         sync()
         return self.load()  # read back: what cannot be read is not in force
+
+    def clear(self):  # back to the factory calibration: the older slot goes first, so that it never comes back
+        held = self.load()
+        newer = NAMES.index(held.where) if held.where in NAMES else 0
+        for slot in (1 - newer, newer):
+            try:
+                os.remove(self._path(slot))
+            except OSError as error:
+                if error.errno != _NONE_THERE:
+                    raise
+        sync()
+        return self.load()
 
     def _path(self, slot):
         return self._folder + "/" + _FILES[slot]

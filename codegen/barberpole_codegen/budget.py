@@ -16,14 +16,15 @@ from typing import Any
 from barberpole.board import Board
 
 from barberpole_codegen.costs import (
+    AXIS,
     CALL,
     FLOAT_OPERATION,
     GIVENS_INNER,
     PACK,
     REFERENCE_MHZ,
     ROOT,
-    SAMPLE_WORD,
     VIPER_OPERATION,
+    WORD,
     at_clock,
     program_us,
 )
@@ -118,7 +119,8 @@ def _sources(board: Board) -> dict[str, str]:
         "float operation": FLOAT_OPERATION,
         "square root": ROOT,
         "inner step of a Givens row": GIVENS_INNER,
-        "sample": SAMPLE_WORD,
+        "sum of an axis": AXIS,
+        "sample in bytecode": WORD,
         "operation in viper": VIPER_OPERATION,
         "call of native code": CALL,
         "figure of a row in bytecode": PACK,

@@ -25,7 +25,8 @@ FLOAT_OPERATION = Cost(9.4, "340 us for demodulation, 3 x 3 matrix and cross fie
 GIVENS_INNER = Cost(
     55.0, "4.1 ms for a row of 10 unknowns and 3 right-hand sides: 75 inner steps, square roots included"
 )
-SAMPLE_WORD = Cost(4.6, "220 us for the sum of 16 x 3 samples; a three-byte word is counted as two")
+AXIS = Cost(12.0, "estimated: bytecode around the native sum of an axis and the tests of its ends")
+WORD = Cost(9.2, "220 us for the sum of 16 x 3 samples in bytecode; a three-byte word is counted as two")
 ROOT = Cost(12.0, "estimated: a float operation and a call")
 VIPER_OPERATION = Cost(0.036, "4.5 instructions of Thumb (as compiled), 1.3 cycles each")
 CALL = Cost(4.0, "estimated: bytecode around a call of native code with its arguments")

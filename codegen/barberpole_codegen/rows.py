@@ -1,7 +1,7 @@
 """What a streamed row costs, by each path, and which path is taken: bytecode where it fits, viper above.
 
-A flip cycle is settling, sampling and a row; what does not fit stretches the cycle. Operations of native code are
-counted in the source of firmware/bp_fixed.py.
+Half a flip cycle is settling and sampling, and after RESET the row; what does not fit stretches the cycle. Operations
+of native code are counted in the source of firmware/bp_fixed.py.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from barberpole.board import Board
 from barberpole.errors import InputError, LimitError, must
 
-from barberpole_codegen.costs import CALL, PACK, SAMPLE_WORD, VIPER_OPERATION, at_clock, program_us
+from barberpole_codegen.costs import AXIS, CALL, PACK, VIPER_OPERATION, WORD, at_clock, program_us
 from barberpole_codegen.hot import Hot
 from barberpole_codegen.trace import Program
 
@@ -35,8 +35,8 @@ class RowPath:
 
 def row_us(programs: dict[str, Program], hot: Hot | None, board: Board) -> dict[str, dict[str, float]]:
     """Estimated µs of the parts of a streamed row, by path. The check sum of a frame is native on both."""
-    words = 2 * 3 * board.adc.samples_per_half
-    sums = {"sums_of_a_cycle": at_clock(board, 2 * words * SAMPLE_WORD.us)}
+    half = native_us(board, 3 * board.adc.samples_per_half * SUM24) + at_clock(board, 3 * AXIS.us + 5 * WORD.us)
+    sums = {"sums_of_half_a_cycle": half}
     frame = native_us(board, ROW_BYTES * CRC)
     slow = {"undo": program_us(programs["undo"], board), "pack": at_clock(board, 2 * SUMS * PACK.us)}
     paths = {BYTECODE: {**sums, **slow, "frame": frame + at_clock(board, 4 * CALL.us)}}
@@ -56,8 +56,9 @@ def native_us(board: Board, operations: int) -> float:
 
 
 def sampling_us(board: Board) -> float:
-    """What a flip cycle needs for its pulses, settling and samples."""
-    return 2.0 * (board.flip.pulse_us + board.flip.settle_us + 1e6 * board.adc.samples_per_half / board.adc.sample_hz)
+    """What half a flip cycle needs for its pulse, settling and samples; the first sample may just have been missed."""
+    conversions = board.adc.samples_per_half + 1
+    return board.flip.pulse_us + board.flip.settle_us + 1e6 * conversions / board.adc.sample_hz
 
 
 def choose_path(asked: str, programs: dict[str, Program], hot: Hot | None, board: Board) -> RowPath:
@@ -67,8 +68,8 @@ def choose_path(asked: str, programs: dict[str, Program], hot: Hot | None, board
     if asked == VIPER and hot is None:
         raise LimitError(must("the calibration", "one whose inverse fits into fixed point", "a range that does not"))
     needs = {name: sum(parts.values()) for name, parts in row_us(programs, hot, board).items()}
-    left = 1e6 / board.flip.rate_hz - sampling_us(board)
-    says = f"at {board.flip.rate_hz:g} Hz sampling leaves {left:.0f} us of a cycle; " + ", ".join(
+    left = 0.5e6 / board.flip.rate_hz - sampling_us(board)
+    says = f"at {board.flip.rate_hz:g} Hz sampling leaves {left:.0f} us of half a cycle; " + ", ".join(
         f"a row needs {us:.0f} us in {name}" for name, us in needs.items()
     )
     if asked != AUTO:

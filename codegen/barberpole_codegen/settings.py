@@ -130,6 +130,7 @@ def _names(board: Board) -> list[Constant]:
     return [
         Constant("BOARD", board.name),
         Constant("SENSOR", board.sensor.name),
+        Constant("WATCHDOG_S", round(board.watchdog_s), "0: none"),
         Constant("SHIELDED", bool(board.shielded), "powers up in a shield: the ambient field is known to be zero"),
     ]
 

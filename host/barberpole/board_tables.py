@@ -233,6 +233,8 @@ class Board:
     coils: Coils
     selfcal: Selfcal
     timing: Timing
+    watchdog_s: Annotated[float, Field(ge=0, le=32)] = 0.0
+    """s. After so long without a sign of the program the board restarts; 0: never. In [board]."""
 
     @property
     def scale_lsb_per_ut(self) -> float:

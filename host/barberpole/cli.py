@@ -23,6 +23,7 @@ from barberpole.commands import (
     doctor,
     fleet,
     imcs,
+    live,
     methods,
     report,
     trajectory,
@@ -49,6 +50,7 @@ board.register(app)
 board_check.register(app)
 imcs.register(app)
 array.register(app)
+live.register(app)
 trajectory.register(app)
 design.register(app)
 challenge.register(app)

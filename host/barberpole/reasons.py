@@ -49,6 +49,8 @@ TABLE = tuple(
                 "samples_lost",
                 "Flip cycles went by unread: a pause was longer than the ring of samples is deep.",
             ),
+            ("watchdog", "The watchdog restarted the board: its program had stood still."),
+            ("factory_reset", "A host put the factory calibration in force."),
         )
     )
 )

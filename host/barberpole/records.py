@@ -16,9 +16,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-HEADER, ROWS, EVENT, RUN, POINTS, RESULT = "H", "D", "E", "T", "P", "S"
-TYPES = frozenset((HEADER, ROWS, EVENT, RUN, POINTS, RESULT))
-JSON_TYPES = frozenset((HEADER, EVENT, RUN, RESULT))
+HEADER, ROWS, EVENT, RUN, POINTS, RESULT, ANSWER = "H", "D", "E", "T", "P", "S", "A"
+TYPES = frozenset((HEADER, ROWS, EVENT, RUN, POINTS, RESULT, ANSWER))
+JSON_TYPES = frozenset((HEADER, EVENT, RUN, RESULT, ANSWER))
 FORMAT = 1
 
 POINT = struct.Struct("<h13f")

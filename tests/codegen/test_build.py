@@ -134,7 +134,7 @@ def test_budget_states_cost_and_sources(built, board, generated):
     budget = json.loads((built.folder / "budget.json").read_text())
     assert budget["flash_bytes"]["total"] == sum(v for k, v in budget["flash_bytes"].items() if k != "total")
     assert budget["ram_on_import_bytes"]["bp_trajectory"] < 2048
-    assert set(budget["time_us"]["sources"]) >= {"float operation", "sample", "clock"}
+    assert set(budget["time_us"]["sources"]) >= {"float operation", "operation in viper", "clock"}
     assert budget["time_us"]["selfcal_run"] < 2e6
     assert budget["float32_error_of_full_scale"]["undo"] < 1e-5
     half = times_us(generated.programs, replace(board, cpu_mhz=84.0), generated.hot, generated.path)

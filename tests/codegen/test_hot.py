@@ -86,7 +86,7 @@ view = memoryview(kept)
 spots = [view[94 * i : 94 * i + 94] for i in range(len(rows))]
 micropython.heap_lock()
 for i in range(len(rows)):
-    line = fast.frame(sums[i], limbs, i)
+    line = fast.line(sums[i], limbs, i)
     spots[i][:] = line
 micropython.heap_unlock()
 for i in range(len(rows)):
@@ -157,7 +157,7 @@ for most in (8 * 0x7FFFFF, -8 * 0x800000):
     for axis in range(6):
         full = array("i", sums)
         full[axis] = most
-        found.append(fast.frame(full, array("H", (0, 0, 0, 0)), 0) is None)
+        found.append(fast.line(full, array("H", (0, 0, 0, 0)), 0) is None)
 print(json.dumps(found))
 """
 

@@ -21,7 +21,7 @@ for k in range(2):
     p.put([0.5, -1.0, k], [1e6, 2, 3, 4, 5, 6], [1.5, 2.5, 3.5], 25.25)
     w.frame(r.POINT, p.packed(k))
 w.event(1.5, 2, "ambient_step", "It moved.", {})
-print(r.crc16(b"123456789"))
+print(r.crc16(b"123456789", 9))
 """
 
 

@@ -16,8 +16,13 @@ FAULTS = {
     "dac_silent": "the DAC does not answer on its bus",
     "wrong_chip": "the ADC answers with the identity of another part",
     "ambient_step": "the ambient field jumps while the coils are first driven",
+    "flash_full": "the file system of the flash is filled to the last block",
+    "store_corrupt": "a bit of each stored calibration has fallen over",
     "supply_low": "the strap supply is at 60 %: its pulses do not flip the bridges",
 }
+
+
+FLASH_FAULTS = frozenset(("flash_full", "store_corrupt"))  # played by the interpreter's own flash (shims/_start.py)
 
 
 def check_faults(names: Iterable[str]) -> frozenset[str]:

@@ -150,8 +150,8 @@ class BoardProcess:
         """After an exit that nobody outside asked for: power cut, machine.reset(), soft reset or crash."""
         if self._cut:
             return
-        if ending.hard:
-            self._start(HARD, ending.now_us)
+        if ending.cause is not None:
+            self._start(ending.cause, ending.now_us)
         elif not os.WIFSIGNALED(ending.status):
             self._say(b"MPY: sync filesystems\r\nMPY: soft reboot\r\n")
             self._start(SOFT, ending.now_us, ending.raw)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from barberpole.twin.ads131m08 import NEVER_US
 from barberpole.twin.console import Console
+from barberpole.twin.faults import FLASH_FAULTS
 from barberpole.twin.interpreter import Interpreter
 from barberpole.twin.pins import PINS, SPI_CLOCK_HZ
 from barberpole.twin.wire import Op, Wire
@@ -17,7 +18,7 @@ from barberpole.twin.wiring import AnyBoard, Wiring
 INTERRUPT_S = 0.1  # a program that asks nothing for so long is interrupted by a signal
 INSIST_S = 2.0  # and one that asks only what must not be interrupted, after this
 PORT_RAM_KIB = 92  # of the STM32F405's RAM, what MicroPython itself takes; the rest is heap
-POWER_ON, HARD, SOFT = 1, 2, 0  # machine.reset_cause()
+POWER_ON, HARD, WATCHDOG, SOFT = 1, 2, 3, 0  # machine.reset_cause()
 CTRL_A, CTRL_C = b"\x01", b"\x03"
 
 
@@ -50,12 +51,12 @@ class Start:
 
 @dataclass(frozen=True)
 class Ending:
-    """How a start ended: wait status, prompt it was in, board time, and whether machine.reset() asked for it."""
+    """How a start ended: wait status, prompt it was in, board time, and the cause of the reset where there was one."""
 
     status: int
     raw: bool
     now_us: int
-    hard: bool
+    cause: int | None
 
 
 class Running:
@@ -65,9 +66,10 @@ class Running:
         self._say = say
         self._console = Console(start.raw)
         self._wire = Wire(soldered, self._on_op, start.now_us)
-        self._interpreter = Interpreter(job.micropython, _heap_bytes(job), self._setup(job, start))
+        self._interpreter = Interpreter(job.micropython, _heap_bytes(job), self._setup(job, start, soldered))
         self._wire.close_far_ends()
-        self._started = self._ready = self._hard = False
+        self._started = self._ready = False
+        self._cause: int | None = None
         self._pending = b""  # input that waits for the prompt
         self._interrupt_at: float | None = None
 
@@ -91,7 +93,7 @@ class Running:
         """Readable when the interpreter has said something, or has ended."""
         return self._interpreter.fileno
 
-    def _setup(self, job: Job, start: Start) -> dict:
+    def _setup(self, job: Job, start: Start, soldered: Soldered) -> dict:
         board, (to, source) = job.board, self._wire.far_ends
         return {
             "to": to,
@@ -103,6 +105,7 @@ class Running:
             "image": str(job.image),
             "romfs": str(job.romfs or ""),
             "frozen": str(job.frozen or ""),
+            "flash_faults": sorted(soldered.faults & FLASH_FAULTS),
             "pins": PINS,
             "drdy": board.adc.drdy_pin,
             "adc_reset": board.adc.reset_pin,
@@ -128,8 +131,8 @@ class Running:
             self._ready = True
             if self._console.raw:
                 self._type(CTRL_A)  # a board stays in its raw prompt
-        elif op == Op.RESET:
-            self._hard = True
+        elif op in (Op.RESET, Op.BITE):
+            self._cause = HARD if op == Op.RESET else WATCHDOG
             self.kill()
 
     def _drain(self) -> None:
@@ -159,11 +162,16 @@ class Running:
             self._wire.interrupt = True
             self._interrupt_at = time.monotonic() + INTERRUPT_S
             data = data.replace(CTRL_C, b"")
-        if self._ready and self._console.at_prompt:
+        if (self._ready and self._console.at_prompt) or (not interrupts and self._listens()):
             self._type(data)
         else:
             self._pending += data
         return interrupts
+
+    def _listens(self) -> bool:
+        """Whether main.py runs, to which a PC may talk, and nobody has asked for the prompt."""
+        free = self._started and not self._ready and self._interrupt_at is None and not self._wire.interrupt
+        return free and not self._pending and self._interpreter.executes()
 
     def look(self, now_s: float) -> None:
         """A program that asks nothing cannot be answered with the interrupt: it gets a signal."""
@@ -190,7 +198,7 @@ class Running:
         """Wait for the exit and close everything."""
         self._wire.close()
         status = self._interpreter.close()
-        return Ending(status, self._console.raw, self._wire.now_us, self._hard)
+        return Ending(status, self._console.raw, self._wire.now_us, self._cause)
 
 
 def heap_bytes(board: AnyBoard) -> int:

@@ -16,7 +16,7 @@ _HEAD = struct.Struct("<qq")
 class Op(enum.IntEnum):
     """What a request asks for."""
 
-    SYNC, SPI, FLASH, STARTED, READY, RESET = range(6)
+    SYNC, SPI, FLASH, STARTED, READY, RESET, BITE = range(7)
 
 
 class Wire:

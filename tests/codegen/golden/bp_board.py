@@ -3,6 +3,7 @@
 
 BOARD = "pybv11"
 SENSOR = "hmc1021_1022"
+WATCHDOG_S = 0  # 0: none
 SHIELDED = False  # powers up in a shield: the ambient field is known to be zero
 SET_PIN = "Y1"
 RESET_PIN = "Y2"
@@ -53,4 +54,4 @@ SETTLE_CYCLES = 0  # dropped after each new current
 CYCLES_PER_POINT = 2
 CURRENT_TOLERANCE = 0.100000001
 AMBIENT_STEP_LIMIT_UT = 0.300000012
-HASH = "c72b041ebfb7"  # of all of the above
+HASH = "607fe8ab539c"  # of all of the above

@@ -37,7 +37,7 @@ from math import sqrt
 
 MODEL = "afb2e175a12a"  # the effects and their settings
 CALIBRATION = "49de9c7a3545"
-BOARD = "c72b041ebfb7"  # bp_board.HASH that this belongs to
+BOARD = "607fe8ab539c"  # bp_board.HASH that this belongs to
 TRAJECTORY = "2a88b776adb7"  # bp_trajectory.ID that this belongs to
 PATH = "viper"  # of a streamed row: bytecode, or viper by bp_hot
 EFFECTS = (

@@ -10,7 +10,7 @@ from array import array
 
 import os
 
-SYNC, SPI, FLASH, STARTED, READY, RESET = range(6)
+SYNC, SPI, FLASH, STARTED, READY, RESET, BITE = range(7)
 NEVER = 1 << 60
 PERIOD = 1 << 30  # ticks of this port wrap here
 
@@ -33,6 +33,7 @@ _changes = 0
 _ready = -1  # when data-ready is low; -1: not known, ask
 _sync_at = 0
 now = setup["now"]
+_bite_at = 0  # when the watchdog restarts the board; 0: it does not run
 
 
 def exchange(op, bus=0, out=None, into=None):
@@ -57,6 +58,13 @@ def exchange(op, bus=0, out=None, into=None):
         _sync_at = min(now + _SYNC_EVERY, setup["cut"])
     if interrupted:
         raise KeyboardInterrupt
+    if 0 < _bite_at <= now and op != BITE:
+        exchange(BITE)
+
+
+def feed(us):  # the watchdog, which begins with the first meal
+    global _bite_at
+    _bite_at = now + us
 
 
 def advance(us):

@@ -160,6 +160,17 @@ def lightsleep(ms=0):
     _twin.advance(1000 * ms)
 
 
+class WDT:
+    def __init__(self, id=0, timeout=5000):
+        if not 1 <= timeout <= 32760:
+            raise ValueError("timeout out of range")
+        self._us = 1000 * timeout
+        self.feed()
+
+    def feed(self):
+        _twin.feed(self._us)
+
+
 def reset_cause():
     return _twin.setup["cause"]
 
