@@ -24,6 +24,7 @@ def _answer(station, line, done, fields):
 
 def _status(station, line):
     sampler, held = station.hardware.sampler, station.held
+    gc.collect()
     fields = {
         "state": station.state,
         "reasons": station.codes,

@@ -2,7 +2,7 @@
 try:
     import bp_fixed as fixed
     from bp_fixed import add, crc16, sum24
-except (ImportError, SyntaxError, AttributeError, NameError):  # it is not there, or this port has no native code
+except (ImportError, ValueError, SyntaxError, AttributeError, NameError):  # not there, or for another processor
     fixed = None
 
     def add(limbs, count):  # to a number of 64 bits in four halfwords; count: 0 to 2^30

@@ -78,7 +78,10 @@ def _record(port: str, beside: Path, frames: int | None, clock: _Clock, start, t
 
 
 def _frames(line: Line, clock: _Clock) -> Iterator[bytes]:
-    """Lines that are frames, until the time is over, the board falls silent, or the cable is unplugged."""
+    """Lines that hold frames, until the time is over, the board falls silent, or the cable is unplugged.
+
+    The first may stand behind a prompt that was left there.
+    """
     pending = b""
     heard = time.monotonic()
     while clock.running:
@@ -91,4 +94,4 @@ def _frames(line: Line, clock: _Clock) -> Iterator[bytes]:
         elif time.monotonic() - heard > SILENCE_S:
             return
         *whole, pending = (pending + block).split(b"\n")
-        yield from (text.rstrip(b"\r") + b"\n" for text in whole if text.startswith(b"$"))
+        yield from (text.rstrip(b"\r") + b"\n" for text in whole if b"$" in text)

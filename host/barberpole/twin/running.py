@@ -126,6 +126,9 @@ class Running:
             self._started = True
             self._wire.interrupt = CTRL_C in self._pending
             self._pending = self._pending.replace(CTRL_C, b"")
+            if not self._wire.interrupt:
+                self._type(self._pending)
+                self._pending = b""
         elif op == Op.READY:
             self._drain()
             self._ready = True
