@@ -11,7 +11,6 @@ ROW_FORMAT = "<qiiiiiiffffffff"  # what this file can fill: time, six sums, temp
 _ROW = const(64)
 _SUMS = const(11)  # where they stand in the body, after head and time
 _FLOATS = const(35)
-_OFFSET = const(0x100000)  # LSB, an eighth of the converter's scale: the largest that is taken off in fixed point
 
 
 class FastRow:
@@ -29,7 +28,7 @@ class FastRow:
         self.ready = False
         for i in range(6):
             offset_lsb = compensator.offset_lsb[i % 3]
-            if not abs(offset_lsb) < _OFFSET:
+            if not abs(offset_lsb) < hot.MOST_OFFSET_LSB:
                 return
             self._offsets[i] = round(offset_lsb * (self._samples << hot.SHIFTS[2 * i]))
         given = tuple(compensator.gain) + (tuple(compensator.shift_ut) if hot.SHIFTED else ())

@@ -146,3 +146,22 @@ def sum24(raw: ptr8, at: int, step: int, end: int, found: ptr32):
     found[0] = total
     found[1] = low
     found[2] = high
+
+
+@micropython.viper
+def sum16(codes: ptr16, at: int, step: int, end: int, found: ptr32):
+    # the same of codes without a sign
+    total = 0
+    low = 0xFFFF
+    high = 0
+    while at < end:
+        word = codes[at]
+        total += word
+        if word < low:
+            low = word
+        if word > high:
+            high = word
+        at += step
+    found[0] = total
+    found[1] = low
+    found[2] = high

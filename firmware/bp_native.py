@@ -1,7 +1,7 @@
 # bp_native.py: machine code (bp_fixed) where this MicroPython compiles it, the same in bytecode where it does not.
 try:
     import bp_fixed as fixed
-    from bp_fixed import add, crc16, sum24
+    from bp_fixed import add, crc16, sum16, sum24
 except (ImportError, ValueError, SyntaxError, AttributeError, NameError):  # not there, or for another processor
     fixed = None
 
@@ -27,6 +27,18 @@ except (ImportError, ValueError, SyntaxError, AttributeError, NameError):  # not
             word = raw[at] << 16 | raw[at + 1] << 8 | raw[at + 2]
             if word & 0x800000:
                 word -= 0x1000000
+            total += word
+            if word < low:
+                low = word
+            if word > high:
+                high = word
+            at += step
+        found[0], found[1], found[2] = total, low, high
+
+    def sum16(codes, at, step, end, found):  # the same of codes without a sign
+        total, low, high = 0, 0xFFFF, 0
+        while at < end:
+            word = codes[at]
             total += word
             if word < low:
                 low = word

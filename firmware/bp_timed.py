@@ -9,6 +9,7 @@ from micropython import const
 
 import bp_reasons as reasons
 import bp_timers
+from bp_native import sum16
 from bp_ring import SLIPPED, Ring
 from bp_sampler import BRIDGE, COIL, RESET, SET, SUPPLY
 from bp_scan import INPUTS, Scan
@@ -38,6 +39,7 @@ class TimedSampler:
         self._running = False
         self.sums = array("i", bytearray(4 * _SUMS))
         self._one = array("i", bytearray(4 * _SUMS))  # of the cycle that is being read
+        self._found = array("i", bytearray(12))  # sum, smallest and largest
         self.mid_us = 0  # ticks of the last RESET pulse, the middle of the last cycle
         self.cycles = 0
         self.lost = 0  # flip cycles that were overwritten before they were read, or sampled with gaps; never cleared
@@ -157,19 +159,11 @@ class TimedSampler:
         one[SUPPLY] += codes[at + 7]
 
     def _axis(self, into, axis, first):
-        codes = self._scan.ring
-        total, low, high = 0, _TOP, 0
-        i = first * INPUTS + axis
-        end = i + self.samples * INPUTS
-        while i < end:
-            code = codes[i]
-            total += code
-            if code < low:
-                low = code
-            if code > high:
-                high = code
-            i += INPUTS
-        self._one[into] = total - self.samples * _MIDDLE
+        found = self._found
+        at = first * INPUTS + axis
+        sum16(self._scan.ring, at, INPUTS, at + self.samples * INPUTS, found)
+        low, high = found[1], found[2]
+        self._one[into] = found[0] - self.samples * _MIDDLE
         if low == 0 or high == _TOP:
             self.clipped |= 1 << axis
         if low < high:

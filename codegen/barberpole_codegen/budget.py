@@ -22,6 +22,7 @@ from barberpole_codegen.costs import (
     GIVENS_INNER,
     PACK,
     REFERENCE_MHZ,
+    RING,
     ROOT,
     VIPER_OPERATION,
     WORD,
@@ -29,7 +30,7 @@ from barberpole_codegen.costs import (
     program_us,
 )
 from barberpole_codegen.hot import Hot
-from barberpole_codegen.rows import RowPath, row_us, sampling_us
+from barberpole_codegen.rows import RowPath, free_us, row_us
 from barberpole_codegen.trace import Program
 
 UNKNOWNS, SIDES = 4, 3
@@ -61,7 +62,7 @@ def times_us(programs: dict[str, Program], board: Board, hot: Hot | None, path: 
         "parts": {name: round(value) for name, value in (rows[path.name] | parts).items()},
         "row_by_path": {name: round(sum(found.values())) for name, found in rows.items()},
         "flip_cycle": round(cycle_us),
-        "sampling": round(sampling_us(board)),
+        "free_for_a_row": round(free_us(board)),
         "sample": round(sum(rows[path.name].values())),
         "selfcal_point": round(point_us),
         "selfcal_run": round(run.points * cycles * cycle_us + read * point_us),
@@ -120,6 +121,7 @@ def _sources(board: Board) -> dict[str, str]:
         "square root": ROOT,
         "inner step of a Givens row": GIVENS_INNER,
         "sum of an axis": AXIS,
+        "ring": RING,
         "sample in bytecode": WORD,
         "operation in viper": VIPER_OPERATION,
         "call of native code": CALL,

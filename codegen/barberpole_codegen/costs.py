@@ -28,6 +28,7 @@ GIVENS_INNER = Cost(
 AXIS = Cost(12.0, "estimated: bytecode around the native sum of an axis and the tests of its ends")
 WORD = Cost(9.2, "220 us for the sum of 16 x 3 samples in bytecode; a three-byte word is counted as two")
 ROOT = Cost(12.0, "estimated: a float operation and a call")
+RING = Cost(150.0, "estimated: bytecode that finds a cycle in the ring and looks twice whether it is whole")
 VIPER_OPERATION = Cost(0.036, "4.5 instructions of Thumb (as compiled), 1.3 cycles each")
 CALL = Cost(4.0, "estimated: bytecode around a call of native code with its arguments")
 PACK = Cost(6.0, "estimated: bytecode that reads one figure and hands it to struct.pack")

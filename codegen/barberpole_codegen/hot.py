@@ -20,8 +20,7 @@ from barberpole_codegen.functions import GAINS, SHIFTS, SUMS, trace_row
 from barberpole_codegen.narrow import narrow
 
 READINGS = SUMS[:6]
-FULL_SCALE = 1 << 23  # codes of the converter
-READ_MOST = 1.125 * FULL_SCALE  # with an eighth for the offset that bp_fast takes off
+OFFSET_ROOM = 8  # the offset that bp_fast takes off a reading is at most this part of the converter's codes
 ROOM = 1.02  # the box of a reading over what the model gives in the range
 SHIFT_UT = 20.0  # largest change of the bias that a shielded run may find
 SMALLEST_UT = coverage.EARTH_UT  # a narrower range is of no use
@@ -62,13 +61,20 @@ def _inputs(fitted: Fitted, board: Board, temps_c: tuple[float, float], range_ut
     """The box of each input in units of its sum: what the model gives in the range, temperatures and gains tried."""
     tried = coverage.conditions(range_ut, board, temps_c, 0.0)
     given = coverage.readings(fitted, fitted.model, tried)
-    samples = board.adc.samples_per_half
-    placed = {name: _input(_box(samples * given[name], ROOM), samples * READ_MOST) for name in READINGS}
+    samples, full_scale = board.adc.samples_per_half, 1 << board.adc.bits  # codes with or without a sign
+    placed = {
+        name: _input(_box(samples * given[name], ROOM), samples * (full_scale + _most_offset(board)))
+        for name in READINGS
+    }
     scales = settings.row_scales(board)
     bridge = _box((scales.conversions / scales.c_per_lsb) * (np.asarray(temps_c) - scales.zero_c), 1.0)
-    most = float(scales.conversions * FULL_SCALE)
+    most = float(scales.conversions * full_scale)
     placed["bridge"] = _input(bridge, most)
     return placed | {name: _input(Interval(-most, most), most) for name in SUMS[7:]}
+
+
+def _most_offset(board: Board) -> int:
+    return (1 << board.adc.bits) // OFFSET_ROOM
 
 
 def _box(values: np.ndarray, room: float) -> Interval:
@@ -91,7 +97,7 @@ def _slow(board: Board) -> dict[str, Interval]:
     return boxes | ({name: Interval(-SHIFT_UT, SHIFT_UT) for name in SHIFTS} if board.shielded else {})
 
 
-def hot_text(hot: Hot, calibration: str, version: str) -> str:
+def hot_text(hot: Hot, board: Board, calibration: str, version: str) -> str:
     """bp_hot.py, of the calibration with this hash."""
     count, program = hot.count(), hot.program
     notes = [
@@ -101,12 +107,12 @@ def hot_text(hot: Hot, calibration: str, version: str) -> str:
     ]
     comment = ("What changes once per power-up, in the order of SLOW.",)
     slow = Function("slow", program.slow_float, comment)
-    constants = [Constant("CALIBRATION", calibration, "that this belongs to"), *_constants(hot)]
+    constants = [Constant("CALIBRATION", calibration, "that this belongs to"), *_constants(hot, board)]
     title = "bp_hot.py: a row in fixed point, run by bp_fixed."
     return module(title, f"calibration {calibration}", version, notes, constants, [slow])
 
 
-def _constants(hot: Hot) -> list[Constant]:
+def _constants(hot: Hot, board: Board) -> list[Constant]:
     program = hot.program
     placed = [program.inputs[name] for name in SUMS]
     limits = [_limits(v) for v in placed]
@@ -123,6 +129,7 @@ def _constants(hot: Hot) -> list[Constant]:
         Constant("REGISTERS", struct.pack(f"<{len(registers)}i", *registers), "int32: constants, zero elsewhere"),
         Constant("INPUTS", _halfwords([v.register for v in placed]), "uint16: register of each sum"),
         Constant("SHIFTS", _halfwords([BITS - v.k for v in placed]), "uint16: to the left, from sum to register"),
+        Constant("MOST_OFFSET_LSB", _most_offset(board), "that is taken off a reading"),
         Constant("LOW", struct.pack(f"<{len(limits)}i", *(low for low, _ in limits)), "int32: of an input register"),
         Constant("HIGH", struct.pack(f"<{len(limits)}i", *(high for _, high in limits))),
         Constant("SLOW", tuple(v.register for v in program.slow), "registers of what slow() gives"),

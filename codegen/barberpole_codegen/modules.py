@@ -58,7 +58,7 @@ def generate(board: Board, calibration: Calibration, path: str = AUTO) -> Genera
         "bp_calibration.py": calibration_text(calibration, board, table, programs, precision, chosen.name),
     }
     if hot is not None and chosen.name == VIPER:
-        texts["bp_hot.py"] = hot_text(hot, calibration.hash, VERSION)
+        texts["bp_hot.py"] = hot_text(hot, board, calibration.hash, VERSION)
     return Generated(texts, programs, precision, table, chosen, hot)
 
 

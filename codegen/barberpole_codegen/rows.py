@@ -1,7 +1,8 @@
 """What a streamed row costs, by each path, and which path is taken: bytecode where it fits, viper above.
 
-Half a flip cycle is settling and sampling, and after RESET the row; what does not fit stretches the cycle. Operations
-of native code are counted in the source of firmware/bp_fixed.py.
+Where the program samples, half a flip cycle is settling and sampling, and after RESET the row; what does not fit
+stretches the cycle. Where timers sample into a ring, a row may take a whole cycle; what does not fit is lost.
+Operations of native code are counted in the source of firmware/bp_fixed.py.
 """
 
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from barberpole.board import Board
 from barberpole.errors import InputError, LimitError, must
 
-from barberpole_codegen.costs import AXIS, CALL, PACK, VIPER_OPERATION, WORD, at_clock, program_us
+from barberpole_codegen.costs import AXIS, CALL, PACK, RING, VIPER_OPERATION, WORD, at_clock, program_us
 from barberpole_codegen.hot import Hot
 from barberpole_codegen.trace import Program
 
@@ -21,6 +22,8 @@ SUMS, FIGURES = 11, 8  # of a row: what goes in, and what comes out as floats
 PRODUCT, SUM, TAKE, FLOAT, NORMALISE, COPY, CRC, BASE64, SUM24 = 47, 42, 37, 43, 5, 7, 17, 35, 22
 FAST_CALLS = 14  # of native code, in bp_fast.FastRow.frame
 SHORTEST = 29  # turns that bring the smallest number to the left: a coil at rest has one
+
+ON_CHIP = "stm32f4_adc"  # is sampled by timers
 
 AUTO, BYTECODE, VIPER = "auto", "bytecode", "viper"
 
@@ -36,7 +39,8 @@ class RowPath:
 def row_us(programs: dict[str, Program], hot: Hot | None, board: Board) -> dict[str, dict[str, float]]:
     """Estimated µs of the parts of a streamed row, by path. The check sum of a frame is native on both."""
     half = native_us(board, 3 * board.adc.samples_per_half * SUM24) + at_clock(board, 3 * AXIS.us + 5 * WORD.us)
-    sums = {"sums_of_half_a_cycle": half}
+    timed = board.adc.part == ON_CHIP
+    sums = {"sums_of_a_cycle": 2 * half + at_clock(board, RING.us)} if timed else {"sums_of_half_a_cycle": half}
     frame = native_us(board, ROW_BYTES * CRC)
     slow = {"undo": program_us(programs["undo"], board), "pack": at_clock(board, 2 * SUMS * PACK.us)}
     paths = {BYTECODE: {**sums, **slow, "frame": frame + at_clock(board, 4 * CALL.us)}}
@@ -55,6 +59,13 @@ def native_us(board: Board, operations: int) -> float:
     return at_clock(board, operations * VIPER_OPERATION.us)
 
 
+def free_us(board: Board) -> float:
+    """What sampling leaves for a row: of half a cycle; of a whole one where timers sample into a ring meanwhile."""
+    if board.adc.part == ON_CHIP:
+        return 1e6 / board.flip.rate_hz
+    return 0.5e6 / board.flip.rate_hz - sampling_us(board)
+
+
 def sampling_us(board: Board) -> float:
     """What half a flip cycle needs for its pulse, settling and samples; the first sample may just have been missed."""
     conversions = board.adc.samples_per_half + 1
@@ -68,8 +79,8 @@ def choose_path(asked: str, programs: dict[str, Program], hot: Hot | None, board
     if asked == VIPER and hot is None:
         raise LimitError(must("the calibration", "one whose inverse fits into fixed point", "a range that does not"))
     needs = {name: sum(parts.values()) for name, parts in row_us(programs, hot, board).items()}
-    left = 0.5e6 / board.flip.rate_hz - sampling_us(board)
-    says = f"at {board.flip.rate_hz:g} Hz sampling leaves {left:.0f} us of half a cycle; " + ", ".join(
+    left = free_us(board)
+    says = f"at {board.flip.rate_hz:g} Hz sampling leaves {left:.0f} us for a row; " + ", ".join(
         f"a row needs {us:.0f} us in {name}" for name, us in needs.items()
     )
     if asked != AUTO:

@@ -147,7 +147,7 @@ sums = json.loads(open("rows.json").read())[0][0]
 compensator = Compensator(bp_board, bp_calibration)
 fast = FastRow(bp_hot, bp_board.SAMPLES_PER_HALF, 68)
 found = []
-for name, first in (("gain", 1.0), ("gain", 1.2), ("offset_lsb", 2e6), ("offset_lsb", float("nan"))):
+for name, first in (("gain", 1.0), ("gain", 1.2), ("offset_lsb", 3e6), ("offset_lsb", float("nan"))):
     setattr(compensator, name, (first, 1.0, 1.0))
     fast.put_in_force(compensator)
     found.append(fast.ready)
