@@ -20,7 +20,7 @@ from barberpole_codegen.modules import VERSION, trajectory_text
 
 FORMAT = 2
 Progress = Callable[[str], None]
-SHARED = (MAIN, "bp_ads131m08.py", "bp_coils.py", "bp_dac80504.py", "bp_reasons.py", "bp_records.py")
+SHARED = (MAIN, "bp_ads131m08.py", "bp_coils.py", "bp_dac80504.py", "bp_native.py", "bp_reasons.py", "bp_records.py")
 GENERATED = ("bp_board", "bp_trajectory")
 
 

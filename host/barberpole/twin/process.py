@@ -133,7 +133,9 @@ class BoardProcess:
         cut_us = NEVER_US if math.isinf(self._power.cut_s) else math.ceil(1e6 * self._power.cut_s)
         self._start_us = now_us
         self._soldered.release_pins(now_us)
-        self._running = Running(self._job, self._soldered, Start(cause, raw, now_us, cut_us), self._say)
+        self._running = Running(
+            self._job, self._soldered, Start(cause, raw, now_us, cut_us, self._power.faults), self._say
+        )
         self._watch(self._running.wire_fd, True)
 
     def _end(self) -> Ending:

@@ -47,6 +47,7 @@ class Start:
     """µs. Board time."""
     cut_us: int = NEVER_US
     """µs. Board time at which the power goes."""
+    faults: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Running:
         self._say = say
         self._console = Console(start.raw)
         self._wire = Wire(soldered, self._on_op, start.now_us)
-        self._interpreter = Interpreter(job.micropython, _heap_bytes(job), self._setup(job, start, soldered))
+        self._interpreter = Interpreter(job.micropython, _heap_bytes(job), self._setup(job, start))
         self._wire.close_far_ends()
         self._started = self._ready = False
         self._cause: int | None = None
@@ -93,7 +94,7 @@ class Running:
         """Readable when the interpreter has said something, or has ended."""
         return self._interpreter.fileno
 
-    def _setup(self, job: Job, start: Start, soldered: Soldered) -> dict:
+    def _setup(self, job: Job, start: Start) -> dict:
         board, (to, source) = job.board, self._wire.far_ends
         return {
             "to": to,
@@ -105,7 +106,7 @@ class Running:
             "image": str(job.image),
             "romfs": str(job.romfs or ""),
             "frozen": str(job.frozen or ""),
-            "flash_faults": sorted(soldered.faults & FLASH_FAULTS),
+            "flash_faults": sorted(start.faults & FLASH_FAULTS),
             "pins": PINS,
             "drdy": board.adc.drdy_pin,
             "adc_reset": board.adc.reset_pin,
