@@ -126,7 +126,8 @@ def test_the_plug_pulled_while_copying_leaves_the_former_build_and_the_rest_is_c
 def changed(built):
     """The build as if another dozen of its files were new, the main program among them."""
     read = read_built(built.folder)
-    paths = [*list(read.files)[: CHANGED - 1], "main.py"]
+    native_first = sorted(read.files, key=lambda path: path not in read.texts)
+    paths = [*native_first[: CHANGED - 1], "main.py"]
     longer = {path: read.files[path] + (b"\n# new\n" if path == "main.py" else b"\0") for path in paths}
     texts = {path: text + "\nNEW = 1\n" for path, text in read.texts.items()}
     return replace(read, files=read.files | longer, texts=texts)
