@@ -151,6 +151,12 @@ def test_self_calibration_runs_on_timed_samples(rig):
     selfcal, constants, calibration, trajectory = map(__import__, names)
     hardware.start()
     hardware.dac.start(2)
+
+    def after_a_pause(codes, write=hardware.coils.set):  # the collector, just before a new current
+        mcu.wait(12_000 * UNITS_PER_US)
+        write(codes)
+
+    hardware.coils.set = after_a_pause
     result = selfcal.run(hardware.sampler, hardware.coils, hardware.compensator, trajectory, calibration, constants)
     assert result.reasons == []
     np.testing.assert_allclose(result.solution.gain, GAIN, rtol=3e-3)  # codes of 0.37 µT

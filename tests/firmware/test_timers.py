@@ -257,6 +257,27 @@ def test_no_collector_pause_costs_a_sample():
     assert behind > 4e3 * UNITS_PER_US  # the pauses were there
 
 
+@pytest.mark.parametrize("before", [True, False])
+def test_a_pause_between_the_looks_at_the_clock_and_at_the_place_is_no_slip(before):
+    bench = Bench(1000)
+    bench.read()
+    pauses = iter([12_000 * UNITS_PER_US])
+
+    def position(look=bench.sampler._ring._position):
+        if before:
+            bench.mcu.wait(next(pauses, 0))
+        place = look()
+        if not before:
+            bench.mcu.wait(next(pauses, 0))
+        return place
+
+    bench.sampler._ring._position = position
+    for expected in range(2, 20):
+        by_time, by_set, by_reset = bench.read()
+        assert (round(by_time), by_set, by_reset) == (expected, expected, expected)
+    assert bench.sampler.lost == 0
+
+
 @pytest.mark.parametrize("pause_ms", [24, 40, 170, 5000])
 def test_a_pause_longer_than_the_ring_is_counted_and_survived(pause_ms):
     bench = Bench(1000)

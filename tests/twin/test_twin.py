@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from barberpole.board import load_board
 from barberpole.errors import InputError, PortError
 from barberpole.twin import FAULTS, Fixed, Twin, World
 
@@ -174,6 +175,11 @@ def test_what_the_pyboard_does_not_have_is_refused(board, tmp_path):
         Twin(replace(board, adc=replace(board.adc, spi=3)), tmp_path)
     with pytest.raises(InputError, match="the seed must be 0 or more; got -1"):
         Twin(board, tmp_path, seed=-1)
+
+
+def test_parts_that_are_not_emulated_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"must be one with the ads131m08 .* got stm32f4_adc and stm32f4_dac"):
+        Twin(load_board("pybv11_timed"), tmp_path)
 
 
 def test_every_fault_has_a_name_and_others_are_refused(board, tmp_path):

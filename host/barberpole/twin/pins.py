@@ -9,12 +9,17 @@ PINS = (
     *(f"Y{i}" for i in range(1, 13)),
     *("P2", "P3", "P4", "P5", "P18", "SW", "LED_RED", "LED_GREEN", "LED_YELLOW", "LED_BLUE"),
 )
+PARTS = ("ads131m08", "dac80504")
+"""Converters that are emulated."""
 SPI_CLOCK_HZ = {1: 84_000_000, 2: 42_000_000}
 """Clock before the prescaler of each SPI: APB2 and APB1 of the STM32F405."""
 
 
 def check_pins(board: Board | Driver) -> None:
-    """Raises InputError where the board file uses a pin or a bus that the pyboard does not have."""
+    """Raises InputError where the board file uses a part, a pin or a bus that the emulated pyboard does not have."""
+    if (board.adc.part, board.dac.part) != PARTS:
+        be = f"one with the {PARTS[0]} and the {PARTS[1]}, and flips timed by the program"
+        raise InputError(must("the emulated board", be, f"{board.adc.part} and {board.dac.part}", board.name))
     adc, dac = board.adc, board.dac
     flip = (board.flip.set_pin, board.flip.reset_pin) if isinstance(board, Board) else ()
     for pin in (*flip, adc.cs_pin, adc.drdy_pin, adc.reset_pin, dac.cs_pin):
