@@ -25,7 +25,7 @@ class Frame:
         body[size - 2] = crc & 0xFF
         body[size - 1] = crc >> 8
         if fixed is None:
-            self._text[1:] = binascii.b2a_base64(body)
+            self._text[1:] = binascii.b2a_base64(bytes(body))
         else:
             fixed.base64(body, size, self._text, 1, _ALPHABET)
         return self._text
