@@ -49,7 +49,7 @@ class Machine:
         widest = max(a.k, b.k)
         own = 2.0 ** (widest + 1 - BITS) * ((a.k != widest + 1) + (b.k != widest + 1))
         work = max(widest, exponent((interval.largest + a.error + b.error + own) * SLACK))
-        shifts = [min(work - v.k, WIDEST_SHIFT) for v in (a, b)]
+        shifts = min(work - a.k, WIDEST_SHIFT), min(work - b.k, WIDEST_SHIFT)
         error = a.error + b.error + 2.0 ** (work - BITS) * sum(shift > 0 for shift in shifts)
         k = max(exponent((interval.largest + error) * SLACK), work - LEFT_SHIFT)
         made = self.register(interval, k, error)

@@ -30,7 +30,7 @@ class _Slow:
     """Steps on slow inputs alone, in floats: an expression is an input's name or a Ref to one of `steps`."""
 
     def __init__(self, boxes: Mapping[str, Interval]):
-        self._boxes: dict[Operand, Interval] = dict(boxes)
+        self._boxes: dict[Operand, Interval] = {**boxes}
         self.steps: list[Step] = []
 
     def do(self, operation: str, *operands: Operand) -> Operand:
