@@ -19,7 +19,7 @@ import numpy as np
 
 from barberpole.fit.ellipsoid import Ellipsoid, algebraic, coverage_message
 
-__all__ = ["Ellipsoid", "algebraic", "coverage_message", "cramer_rao", "efficient"]
+__all__ = ["Ellipsoid", "algebraic", "certainty", "coverage_message", "cramer_rao", "efficient"]
 
 CHUNK = 4096  # readings at a time, so that the columns of (2) stay in the cache
 MAX_STEPS = 8
@@ -73,6 +73,15 @@ def efficient(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
 def cramer_rao(reading: np.ndarray, shape: Ellipsoid, magnitude: float, sigma_lsb: float) -> np.ndarray:
     """Smallest covariance (9, 9) of L11 L12 L13 L22 L23 L33 b1 b2 b3 that noise sigma_lsb on these readings allows."""
     return sigma_lsb**2 * np.linalg.inv(_normal(reading, shape, magnitude).jj)
+
+
+def certainty(reading: np.ndarray, shape: Ellipsoid, magnitude: float) -> tuple[float, np.ndarray]:
+    """Noise of a reading in LSB, nine of them taken up by the fit, and the covariance (9, 9) that it implies.
+
+    Raises numpy's LinAlgError where a direction is not seen at all.
+    """
+    normal = _normal(reading, shape, magnitude)
+    return float(np.sqrt(normal.variance)), normal.variance * np.linalg.inv(normal.jj)
 
 
 def _moved(shape: Ellipsoid, step: np.ndarray) -> Ellipsoid:

@@ -9,7 +9,7 @@ import numpy as np
 
 from barberpole.errors import InputError, must
 from barberpole.fit.ellipsoid import Ellipsoid, coverage_message
-from barberpole.methods.ellipsoid import cramer_rao
+from barberpole.methods.ellipsoid import certainty
 
 LEAST_ROWS = 18  # twice the nine unknowns: with fewer the residual says too little about the noise
 CERTAIN = 0.02  # of the field: 1 µT in 50 is a calibration's worth of error
@@ -53,33 +53,24 @@ def require_determined(shape: Ellipsoid, reading: np.ndarray, known: float) -> N
     filled = 100.0 * float(np.sqrt(np.mean(off**2))) > FILLED
     if filled or gain.max() > GAIN_RATIO * gain.min():
         raise InputError(coverage_message(reading))
-    sigma = noise_lsb(shape, reading, known)
+    sigma, worst = _certainty(shape, reading, known)
     thinnest = float(np.sqrt(max(np.linalg.eigvalsh(np.cov(reading))[0], 0.0)))
-    worst = _worst(shape, reading, known, sigma)
     if thinnest < THICKNESS * sigma or not worst < CERTAIN:
         how = f"{100 * worst:.0f} %" if worst < 1.0 else "nothing"
         raise InputError(f"{coverage_message(reading)}, which leaves the answer certain to {how} of the field")
 
 
-def noise_lsb(shape: Ellipsoid, reading: np.ndarray, known: float) -> float:
-    """RMS distance of readings (3, n) from the surface in LSB, with nine of them taken up by the fit."""
-    field = shape.field(reading)
-    size = np.linalg.norm(field, axis=0)
-    steep = np.linalg.norm(shape.upper.T @ (field / size), axis=0)
-    left = float(np.sum(((size - known) / steep) ** 2))
-    return float(np.sqrt(left / max(reading.shape[1] - 9, 1)))
-
-
-def _worst(shape: Ellipsoid, reading: np.ndarray, known: float, sigma: float) -> float:
-    """Largest standard error of L or b by what it does to the field, over K; infinite where a direction is unseen."""
+def _certainty(shape: Ellipsoid, reading: np.ndarray, known: float) -> tuple[float, float]:
+    """Noise in LSB, and the largest standard error of L or b by what it does to the field, over K; infinite where a
+    direction is unseen."""
     try:
-        stderr = np.sqrt(np.diag(cramer_rao(reading, shape, known, sigma)))
+        sigma, covariance = certainty(reading, shape, known)
     except np.linalg.LinAlgError:
-        return np.inf
-    diagonal = np.diag(shape.upper)
+        return 0.0, np.inf
+    stderr, diagonal = np.sqrt(np.diag(covariance)), np.diag(shape.upper)
     columns = np.array([0, 1, 2, 1, 2, 2])  # of L11 L12 L13 L22 L23 L33
     found = np.concatenate([stderr[:6] / diagonal[columns], stderr[6:] * diagonal / known])
-    return float(found.max()) if np.all(np.isfinite(found)) else np.inf
+    return sigma, float(found.max()) if np.all(np.isfinite(found)) else np.inf
 
 
 def require_no_spikes(left: np.ndarray, size: float, where: object) -> None:

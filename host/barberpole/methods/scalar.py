@@ -10,8 +10,8 @@ from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
 from barberpole.fit.start import Linear
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
-from barberpole.methods.ellipsoid import Ellipsoid, algebraic, coverage_message, cramer_rao, efficient
-from barberpole.methods.guards import LEAST_ROWS, noise_lsb, require_determined, require_no_spikes, require_rows
+from barberpole.methods.ellipsoid import Ellipsoid, algebraic, certainty, coverage_message, efficient
+from barberpole.methods.guards import LEAST_ROWS, require_determined, require_no_spikes, require_rows
 from barberpole.methods.iterative import iterative
 from barberpole.methods.readings import LINEAR_EFFECTS, judged, one_magnitude, scalar
 from barberpole.modelfile import ModelFile
@@ -77,7 +77,7 @@ def _answer(log: Log, given: Given, shape_of: Callable) -> tuple[Answer, Observa
 
 def _values(shape: Ellipsoid, seen: Observations, known: float) -> Values:
     """L of 4.18 in µT/LSB, b of 4.20 in LSB, with the standard errors that the residual implies."""
-    stderr = np.sqrt(np.diag(cramer_rao(seen.y, shape, known, noise_lsb(shape, seen.y, known))))
+    stderr = np.sqrt(np.diag(certainty(seen.y, shape, known)[1]))
     upper = np.zeros((3, 3))
     upper[np.triu_indices(3)] = stderr[:6]
     return matrix_values("L", shape.upper, upper, "uT/LSB") | per_axis("b", shape.centre, stderr[6:], "LSB")
