@@ -22,8 +22,10 @@ lint: $(STAMP) $(STUBS)/.installed
 	@$(BIN)/pyright --warnings --project firmware/pyrightconfig.json
 	@$(BIN)/pyright --warnings --project firmware/driver/pyrightconfig.json
 
-bench: $(STAMP)
-	@$(BIN)/python -m pytest -m bench -s
+# Time, error and memory beside plain least squares and the peers; build/bench.json keeps them for the next run.
+bench: $(STAMP) $(VENV)/.bench
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m bench -s
+	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench
 
 # A few hundred logs of an independent truth: what is named, what is missed, what is alarmed falsely.
 trials: $(STAMP)
@@ -42,6 +44,10 @@ $(STAMP): pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "installing barberpole and its tools into $(VENV) (once)"
 	@$(PIP) --editable '.[twin,fleet,test]'
+	@touch $@
+
+$(VENV)/.bench: $(STAMP)
+	@$(PIP) --editable '.[bench]'
 	@touch $@
 
 # The stubs of MicroPython's modules shadow the standard library, so they live apart from the packages of .venv.

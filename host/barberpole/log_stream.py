@@ -130,7 +130,7 @@ def _names(path: Path) -> tuple[list[str], dict[str, Any]]:
 
 
 def _parquet(path: Path, names: list[str], dropped: list[int]) -> Iterator[dict[str, np.ndarray]]:
-    with pa_parquet.ParquetFile(path) as file:
+    with pa_parquet.ParquetFile(path, pre_buffer=False) as file:
         for batch in file.iter_batches(PIECE, columns=names):
             yield _floats(batch, path)
 
