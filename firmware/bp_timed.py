@@ -62,8 +62,10 @@ class TimedSampler:
 
     def stop(self):
         self._running = False
-        self._pulses.off()
-        self._scan.stop()
+        try:
+            self._pulses.off()
+        finally:
+            self._scan.stop()
 
     def fresh(self):  # what was sampled before now does not count
         if not self._running:

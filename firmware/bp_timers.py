@@ -122,12 +122,18 @@ class Pulses:
         return mem32[stm.TIM8 + stm.TIM_SR] & _BIF != 0
 
     def off(self):  # outputs off, pins low, timers stopped; also what every error ends with
+        try:
+            self._silence()
+        finally:  # once more: a second Ctrl-C may have cut it short
+            self._silence()
+            for timer in self._timers:
+                timer.deinit()
+            self._timers = ()
+
+    def _silence(self):
         if self._timers:
             mem32[stm.TIM8 + stm.TIM_BDTR] = self._bdtr
         self._low()
-        for timer in self._timers:
-            timer.deinit()
-        self._timers = ()
 
     def _low(self):
         for name in self._pins:

@@ -1,5 +1,6 @@
 """The firmware's timer and converter set-up, proved from the registers that it writes (no board, RM0090's rules)."""
 
+import contextlib
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -203,6 +204,29 @@ def test_every_way_out_leaves_both_pins_low(moment):
     assert [bench.mcu.levels[name][-1][1] for name in OUTPUTS] == [0, 0]
     assert all(bench.mcu.levels[name][-1][0] < bench.mcu.now - 49_000 * UNITS_PER_US for name in OUTPUTS)
     assert not overlap(bench.mcu)
+
+
+@pytest.mark.parametrize("moment", range(1, 24))
+def test_a_second_interrupt_while_it_stops_changes_nothing(moment):
+    bench = Bench()
+    bench.read()
+    countdown = [moment]
+
+    def fail(units, wait=bench.mcu.wait):
+        wait(units)
+        countdown[0] -= 1
+        if countdown[0] == 0:
+            raise KeyboardInterrupt
+
+    bench.mcu.wait = fail
+    with contextlib.suppress(KeyboardInterrupt):
+        bench.sampler.stop()
+    countdown[0] = -1
+    stopped = bench.mcu.now
+    bench.mcu.wait(50_000 * UNITS_PER_US)
+    bench.mcu.catch_up()
+    assert [bench.mcu.levels[name][-1][1] for name in OUTPUTS] == [0, 0]
+    assert all(bench.mcu.levels[name][-1][0] <= stopped for name in OUTPUTS)
 
 
 def test_break_input_stops_the_pulses_in_hardware():

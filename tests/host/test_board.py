@@ -153,7 +153,7 @@ def test_power_up_run_fits_into_two_seconds():
         ("flip.timing", 'timing = "hardware"', '"software" with a converter on SPI'),
         ("board.mcu", 'mcu = "STM32F446RE"', "the STM32F405 of a PYBV11"),
         ("board.micropython_board", 'micropython_board = "PYBV9"', "one of NUCLEO_F446RE, PYBV11, STM32F4DISC"),
-        ("flip.rate_hz", "rate_hz = = 200", "valid TOML; got Invalid value (at line 22"),
+        ("flip.rate_hz", "rate_hz = = 200", "valid TOML; got Invalid value (at line 23"),
     ],
 )
 def test_wrong_file_is_refused(tmp_path, key, line, says):
