@@ -1,6 +1,6 @@
 """All hardware of the timed boards, made by the firmware from their generated constants, on the register model."""
 
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -164,3 +164,30 @@ def test_self_calibration_runs_on_timed_samples(rig):
     assert result.temp_c() == pytest.approx(25.0, abs=1.0)
     assert hardware.compensator.supply_v(hardware.sampler) == pytest.approx(16.0, rel=5e-3)
     assert hardware.sampler.lost == 0
+
+
+def test_a_pause_longer_than_the_ring_is_in_the_log_and_the_stream_goes_on(rig):
+    board, mcu, hardware = rig
+    mcu.converter.source = Bridges(board, mcu, hardware)
+    serve, reasons, station_module = map(__import__, ("bp_serve", "bp_reasons", "bp_station"))
+    events, rows = [], []
+    station = SimpleNamespace(
+        hardware=hardware,
+        writer=SimpleNamespace(frame=lambda kind, row: rows.append(row), again=lambda frame: None),
+        clock=SimpleNamespace(go_to=lambda us: None, us=lambda: 0),
+        fast=None,
+        said=(b"", b""),
+        rows=0,
+        state=station_module.STREAMING,
+        event=lambda code, detail="", **values: events.append((code, detail)),
+    )
+    seen = serve._Seen(hardware.sampler)
+    hardware.start()
+    for number in range(12):
+        serve.row(station, seen)
+        if number == 5:
+            mcu.wait(round(2.5e6 * board.adc.ring_cycles / board.flip.rate_hz) * UNITS_PER_US)
+    assert len(rows) == 12
+    assert events == [(reasons.SAMPLES_LOST, f"{hardware.sampler.lost} flip cycles")]
+    assert hardware.sampler.lost >= 1.5 * board.adc.ring_cycles
+    assert station.state == station_module.STREAMING
