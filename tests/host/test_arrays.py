@@ -177,3 +177,14 @@ def test_refusals(logs, tmp_path, capsys):
     (tmp_path / "one.csv").write_text("t_s,a_x_lsb,a_y_lsb,a_z_lsb\n0,1,2,3\n")
     assert command(["array", "gradient", str(tmp_path / "one.csv"), "--calibration", str(tmp_path / "c.toml")]) == 2
     assert "b_x_lsb" in capsys.readouterr().err
+
+
+def test_simulated_logs_hide_a_drift_that_the_coil_run_finds(tmp_path, capsys):
+    hidden = told(capsys, "simulate", "-o", str(tmp_path))["hidden_gain"]
+    then, now = str(tmp_path / "then.toml"), str(tmp_path / "now.toml")
+    turned, run, later = (str(tmp_path / f"{name}.csv") for name in ("turned", "run", "later"))
+    told(capsys, "calibrate", turned, "--run", run, "--magnitude", "47.9165", "-o", then)
+    found = told(capsys, "selfcal", later, "--calibration", then, "-o", now)["sensors"]
+    assert all(found[n]["gain"] == pytest.approx(hidden[n], abs=2e-5) for n in "ab")
+    seen = told(capsys, "gradient", str(tmp_path / "seen.csv"), "--calibration", now)["gradients"][0]
+    assert seen["mean_nt_per_m"] == pytest.approx([300.0, -150.0, 80.0], abs=25.0)

@@ -114,6 +114,25 @@ def gradient(
     OUT.print(shown)
 
 
+@app.command("simulate")
+def simulate_logs(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the four logs.")],
+    array: ArrayOption = "gradiometer",
+    seed: Annotated[int, typer.Option(min=0, help="Of the specimens and the noise.")] = 0,
+    as_json: bool = AS_JSON,
+) -> None:
+    """Logs of an emulated array: turned, a coil run, one after a drift, and at rest in a gradient of 300 nT/m in x."""
+    from barberpole.arrays.array_file import load_array
+    from barberpole.arrays.simulate import simulate
+
+    output.mkdir(parents=True, exist_ok=True)
+    drift = simulate(load_array(array), output, seed)
+    if as_json:
+        print_json({"output": str(output), "hidden_gain": {name: d.tolist() for name, d in drift.items()}})
+    else:
+        OUT.print(f"turned.csv, run.csv, later.csv and seen.csv written to {output}")
+
+
 def _show(found, output: Path, as_json: bool) -> None:
     """Gains over those of the turned log, in ppm; what the turned log left."""
     sensors = {

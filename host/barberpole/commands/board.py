@@ -139,8 +139,9 @@ def twin(
     fault: Annotated[list[str] | None, typer.Option(help="What is broken; repeat for several.")] = None,
     romfs: Annotated[int, typer.Option(min=0, max=256, help="KiB of a ROMFS partition; 0: stock firmware.")] = 0,
     frozen: Annotated[Path | None, typer.Option(help="Build folder that stands in for frozen modules.")] = None,
+    coils: Annotated[Path | None, typer.Option(help="Record of a coil driver, in whose coils the board lies.")] = None,
 ) -> None:
     """Start the emulated board; its port is the first line. Ctrl-C switches it off."""
     from barberpole.twin.command import run_twin
 
-    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen)
+    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen, coils)
