@@ -11,6 +11,7 @@ from barberpole.effects import Conditions
 from barberpole.fit.fit import fit_observations
 from barberpole.methods.ellipsoid import algebraic, efficient
 from barberpole.modelfile import ModelFile
+from barberpole.observations import Observations
 from barberpole.records import encode, encode_json
 
 from bench.data import FIELD_UT, LADDER, ladder, over_the_bound, turned
@@ -45,8 +46,8 @@ def plain(n: int) -> Callable[[], Any]:
 
 def by_fit(y: np.ndarray) -> Shape:
     """`fit --model bias,scale,misalignment`."""
-    seen = turned(y.shape[1], "constant")
-    seen = type(seen)(y, seen.at, None, None, seen.row, "constant", False)
+    rows = np.arange(y.shape[1])
+    seen = Observations(y, Conditions(state=np.zeros(rows.size)), None, None, rows, "constant", False)
     fit = fit_observations(seen, LINEAR)
     at = fit.model.predict(np.hstack([np.zeros((3, 1)), np.eye(3)]), fit.p, Conditions())
     return np.linalg.inv(at[:, 1:] - at[:, :1]), at[:, 0]
@@ -105,7 +106,7 @@ def ellipsoid(who: str, n: int) -> Case:
     """The nine-parameter ellipsoid; the error is RMS over some draws, with a standard error of 1/sqrt(18 draws)."""
     routine, times, most = ROUTINES[who]
     y = turned(n, "constant").y
-    draws = DRAWS[n] if who.startswith("barberpole") else DRAWS[n] // 4
+    draws = DRAWS[n]
 
     def error(_: Any) -> float:
         square = [over_the_bound(*routine(turned(n, "constant", s).y), s, n) for s in range(draws)]
@@ -137,7 +138,6 @@ def full_ladder(n: int = 10_000) -> Case:
 def diagnosis(n: int, seconds: float | None) -> Case:
     """The whole catalogue; nothing is missing, and nothing must be named."""
     seen = turned(n, "vector")
-    seen = type(seen)(seen.y + 0.0, seen.at, seen.b_ut, None, seen.row, "vector", False)
 
     def wrong(found: Any) -> float:
         return float(found.verdict == "missing")
