@@ -14,6 +14,8 @@ class Console:
         self._poll = select.poll()
         self._poll.register(sys.stdin, select.POLLIN)
         self._line = ""
+        for _ in self._poll.ipoll(0):  # it makes its tuple at the first look
+            pass
 
     def command(self, wait_ms=0):  # a whole line, None while there is none
         ready = False

@@ -10,6 +10,7 @@ from barberpole import paths
 from barberpole.errors import InputError, LimitError
 from barberpole.fitted import from_calibration
 from barberpole.mpy import compile_module
+from barberpole.records import decode
 from barberpole_codegen import build, hot, rows, settings
 from barberpole_codegen.fixed import BITS, execute
 from barberpole_codegen.functions import GAINS, SUMS, trace_row
@@ -121,8 +122,6 @@ def ran(board, calibration, micropython, tmp_path_factory):
 
 
 def test_micropython_allocates_nothing_and_meets_the_float_version(ran):
-    from barberpole.records import decode
-
     made, kept, twin, sums = ran
     stream = decode(kept.encode())
     assert (len(stream.frames), stream.damaged, stream.lost) == (ROWS, 0, 0)
@@ -225,3 +224,61 @@ def test_operations_are_counted_in_the_source():
     assert counted == [rows.TAKE, rows.COPY, rows.CRC, rows.BASE64, rows.SUM24]
     compiled = len(compile_module("bp_fixed.py", text)) / operations([ast.parse(text)])
     assert 8.0 < compiled < 13.5  # bytes an operation: 4.5 instructions of two bytes, a few of four
+
+
+STREAM = """
+import json, sys, micropython, time
+from array import array
+import bp_hot, bp_board, bp_calibration, bp_records, bp_report, bp_serve
+from bp_clock import Clock
+from bp_compensate import Compensator
+from bp_console import Console
+from bp_fast import FastRow
+class Sampler:
+    samples, cycles, clipped, lost, mid_us = bp_board.SAMPLES_PER_HALF, 1, 0, 0, 0
+    def clear(self): pass
+    def stop(self): pass
+    def cycle(self): self.mid_us = time.ticks_us()
+class Hardware: pass
+class Station: pass
+station = Station()
+station.hardware = Hardware()
+station.hardware.sampler = sampler = Sampler()
+station.hardware.compensator = Compensator(bp_board, bp_calibration)
+rows, gain, offset = json.loads(open("rows.json").read())
+sampler.sums = array("i", rows[0])
+station.hardware.compensator.gain, station.hardware.compensator.offset_lsb = tuple(gain), tuple(offset)
+station.clock, station.console, station.rows = Clock(), Console(), 0
+kept, at = bytearray(60000), 0
+def write(text):
+    global at
+    for byte in text:
+        kept[at] = byte
+        at += 1
+station.writer = bp_records.Writer(write)
+station.fast = FastRow(bp_hot, bp_board.SAMPLES_PER_HALF, bp_records.ROW)
+station.fast.put_in_force(station.hardware.compensator)
+assert station.fast.ready
+head = bp_report.header("00", 1)
+station.said = (bp_report.again(bp_records.HEADER, head), bp_report.again(bp_records.RESULT, {"accepted": True}))
+seen = bp_serve._Seen(sampler)
+micropython.heap_lock()
+for _ in range(300):
+    bp_serve.row(station, seen)
+    station.console.command()
+micropython.heap_unlock()
+sys.stdout.buffer.write(memoryview(kept)[:at])
+"""
+
+
+def test_the_whole_stream_allocates_nothing(ran, micropython, board, calibration, tmp_path):
+    """Rows, time, sequence, the header and the verdict that are said again, and looking for commands."""
+    _, _, _, table = ran
+    folder = build(board, calibration, tmp_path / "out", path="viper").folder / "src"
+    (folder / "rows.json").write_text(json.dumps([table[:1], GAIN, OFFSET_LSB]))
+    stream = decode(micropython(STREAM, folder).encode())
+    kinds = [f.type for f in stream.frames]
+    assert (kinds.count("D"), kinds.count("H"), kinds.count("S")) == (300, 1, 1)
+    assert (stream.damaged, stream.lost) == (0, 0)
+    times = [int.from_bytes(f.payload[:8], "little") for f in stream.frames if f.type == "D"]
+    assert times == sorted(times)

@@ -34,6 +34,7 @@ def build(
     calibration: Annotated[Path | None, typer.Option(help="calibration.toml; without one, data-sheet values.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write.")] = Path("build"),
     replay: Annotated[Path | None, typer.Option(help="For a coil driver: a log of a turned sensor to play.")] = None,
+    path: Annotated[str, typer.Option(help="How a row is made: bytecode, viper, or auto (by flip rate).")] = "auto",
     as_json: bool = AS_JSON,
 ) -> None:
     """Write the flash-resident modules, .mpy files, manifest, ROMFS image and budget."""
@@ -48,7 +49,7 @@ def build(
 
     target = load_board(board)
     used = read_calibration(calibration) if calibration else nominal(target)
-    made = build_board(target, used, output, None if as_json else lambda text: OUT.print(text, style="dim"))
+    made = build_board(target, used, output, None if as_json else lambda text: OUT.print(text, style="dim"), path)
     if as_json:
         head = {"output": str(output), "build": made.build, "calibration": made.calibration, "model": made.model}
         print_json({**head, "budget": made.budget})
@@ -64,6 +65,10 @@ def _budget_table(budget: dict):
     for what, figure in budget["time_us"].items():
         if isinstance(figure, int | float):
             shown.add_row(what, f"{figure:.0f} µs")
+    shown.add_row("a streamed row", budget["time_us"]["path"])
+    if budget["fixed_point"]:
+        figure = f"{budget['fixed_point']['error_nt']:.2g} nT within ±{budget['fixed_point']['range_ut']:g} µT"
+        shown.add_row("fixed-point error", figure)
     for what, fraction in budget["float32_error_of_full_scale"].items():
         shown.add_row(f"float32 error, {what}", f"{fraction:.1e} of full scale")
     return shown
