@@ -35,8 +35,8 @@ def algebraic(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
     n = reading.shape[1]
     if n < MIN_SAMPLES:
         raise InputError(f"an ellipsoid fit must have at least {MIN_SAMPLES} samples; got {n}")
-    middle = 0.5 * (reading.max(axis=1) + reading.min(axis=1))
-    size = float(np.max(np.ptp(reading, axis=1))) / 2
+    high, low = reading.max(axis=1), reading.min(axis=1)
+    middle, size = 0.5 * (high + low), float(np.max(high - low)) / 2
     if size == 0:
         raise InputError("an ellipsoid fit must have readings that move; got constant readings on all axes")
     gram, total = _normal_equations(reading, middle, size)

@@ -58,7 +58,8 @@ def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
     """The algebraic ellipsoid of readings (3, n), repeated without those far off it: its squares square an outlier."""
     shape, kept = algebraic(y, magnitude_ut), np.ones(y.shape[1], bool)
     for _ in range(TRIMS):
-        apart = np.abs(np.linalg.norm(shape.field(y), axis=0) - magnitude_ut)
+        field = shape.field(y)
+        apart = np.abs(np.sqrt(np.einsum("ik,ik->k", field, field)) - magnitude_ut)
         near = apart <= FAR * float(np.median(apart))
         if np.array_equal(near, kept) or np.mean(near) < 0.5:
             break
