@@ -48,12 +48,14 @@ def test_the_hidden_effect_is_seen_added_undone_and_redone(window, crossed, shot
     window.wait_for_selector(".bp-fall:not(.floor)")
 
 
-def test_a_level_one_trial_is_solved_from_the_page_alone(window, shots):
+def test_a_level_one_trial_is_solved_from_the_page_alone(window, server, shots):
+    window.goto(f"{server}?seed=3")
     window.click("text=Level 1")
     window.click(".bp-card.named button:has-text('Add')")
     window.wait_for_selector("[aria-current=step]:has-text('+')")
     window.click("text=Answer with my model")
     window.wait_for_selector("[data-test=outcome]")
+    window.wait_for_selector("[data-test=trial] td:has-text('LSB')")
     window.screenshot(path=shots / "trial.png")
     assert window.text_content("[data-test=outcome]") == "Right."  # three clicks
 

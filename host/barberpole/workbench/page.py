@@ -27,12 +27,12 @@ from barberpole.workbench.widgets import complain, press, text_of
 
 
 def build(folder: Path, log: Path | None = None) -> None:
-    """Register the page. `log` is open in every new window."""
+    """Register the page. `log` is open in every new window; `/?seed=3` repeats the trials of that seed."""
 
     @ui.page("/")
-    async def window() -> None:
+    async def window(seed: int | None = None) -> None:
         ui.add_head_html(f"<style>{look.CSS}{look.RULES}</style>")
-        page = Page(Session(folder))
+        page = Page(Session(folder), seed=seed)
         page.client.on_delete(page.close)
         page.lay_out()
         await page.client.connected(timeout=20.0)
@@ -48,6 +48,7 @@ class Page:
 
     session: Session
     dark: bool = False
+    seed: int | None = None
     trial: Trial | None = None
     watched: Watch | None = None
     parts: dict[str, list] = field(default_factory=dict)
@@ -135,7 +136,7 @@ class Page:
         with self.client:
             folder = Path(self.session.own.name) / f"trial-{len(list(Path(self.session.own.name).iterdir()))}"
             try:
-                chosen = game.new(folder, level)
+                chosen = game.new(folder, level, self.seed)
             except BarberpoleError as error:
                 complain(str(error))
                 return

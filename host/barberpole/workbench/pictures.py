@@ -16,6 +16,9 @@ from barberpole.figures.decimate import extremes
 from barberpole.workbench.traces import Traces, inside
 
 READINGS = ("x", "y", "z")
+CHOSEN = "#CC79A7"  # reddish purple of the same palette
+DOTS = 450  # of a panel
+GIANT = 15  # one dot in so many is kept for its size
 HEIGHTS = {"traces": 470, "residual": 300, "sphere": 270}
 
 
@@ -100,6 +103,7 @@ def _sphere(traces: Traces, view: View) -> Picture:
 def _sent(figure: figures.Figure, view: View, samples: dict[int, np.ndarray]) -> Picture:
     """The figure as it goes to the page, which is as wide as it happens to be and keeps its zoom."""
     plot = figure.on(view.dark).plot
+    samples = {number: _thinned(plot.data[number], at) for number, at in samples.items()}
     plot.update_layout(autosize=True, uirevision="kept", newselection={"line": {"width": 1.5, "dash": "dot"}})
     if samples:
         plot.update_layout(dragmode="select")
@@ -111,7 +115,18 @@ def _sent(figure: figures.Figure, view: View, samples: dict[int, np.ndarray]) ->
     return Picture(plot.to_plotly_json() | {"config": figures.CONFIG}, figure.title, figure.sentence, samples)
 
 
-CHOSEN = "#CC79A7"
+def _thinned(trace: Any, samples: np.ndarray) -> np.ndarray:
+    """Fewer dots, the largest kept: a browser redraws each of them at every click. Their samples."""
+    if samples.size <= DOTS:
+        return samples
+    size = np.abs(np.asarray(trace.y, float))
+    giants = np.argpartition(size, size.size - DOTS // GIANT)[size.size - DOTS // GIANT :]
+    even = (np.arange(DOTS) * (size.size / DOTS)).astype(int)
+    at = np.union1d(even, giants)
+    trace.x, trace.y = np.asarray(trace.x)[at], np.asarray(trace.y)[at]
+    if trace.customdata is not None:
+        trace.customdata = np.asarray(trace.customdata)[at]
+    return samples[at]
 
 
 def choose(traces: Traces, box: Box, drawn: dict[str, Picture]) -> Chosen:

@@ -10,12 +10,14 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from barberpole.challenge.game import Opened
 from barberpole.errors import BarberpoleError, InputError, must
 from barberpole.modelfile import ModelFile
 from barberpole.workbench.bench import START, Bench
 from barberpole.workbench.guard import below
 from barberpole.workbench.history import History, Step
-from barberpole.workbench.lab import Opened, Summary, without_effect
+from barberpole.workbench.lab import Opened as LogOpened
+from barberpole.workbench.lab import Summary, without_effect
 from barberpole.workbench.own import Tried, with_plugin
 from barberpole.workbench.pictures import Box, Chosen, Picture, View
 from barberpole.workbench.rivals import Comparison
@@ -37,7 +39,7 @@ class Session:
     hands: Worker = field(default_factory=Worker)
     mind: Worker = field(default_factory=Worker)
     history: History | None = None
-    opened: Opened | None = None
+    opened: LogOpened | None = None
     summary: Summary | None = None
     suspicion: Suspicion | None = None
     abscissae: dict[str, str] = field(default_factory=dict)
@@ -108,7 +110,6 @@ class Session:
             return
         self.history = self.path.measured(summary.rms_lsb, summary.heldout_lsb)
         self.abscissae = await self.hands.ask("abscissae", bench)
-        self.on_change("history")
         self.on_change("fit")
         self._judge(bench)
 
@@ -248,6 +249,10 @@ class Session:
         """The model on the bench against that of another step, on held-out stretches."""
         there = replace(self.path.steps[other].bench, excluded=self.bench.excluded)
         return await self._try("comparing", self.hands.ask("rivals", self.bench, there))
+
+    async def truth(self, folder: Path, opened: Opened) -> list[float]:
+        """Held-out error of a trial's first model, then with each effect that was hidden."""
+        return await self._try("fitting the truth", self.mind.ask("truth", folder, opened)) or []
 
     def cancel(self) -> None:
         """Stop whatever is being computed."""

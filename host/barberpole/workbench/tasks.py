@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from barberpole.challenge import game
 from barberpole.workbench.bench import Bench
 from barberpole.workbench.keeping import build_firmware, save_calibration, save_model, save_report
 from barberpole.workbench.lab import Lab, Opened, Summary
@@ -61,6 +63,11 @@ def with_effect(lab: Lab, bench: Bench, effect: str, settings: dict | None) -> B
     return lab.with_effect(bench, effect, settings)
 
 
-BENCH = (open_log, summary, abscissae, picture, select, exclude, suspects, with_effect, rivals, try_effect)
+def truth(lab: Lab, folder: Path, opened: game.Opened) -> list[float]:
+    """Held-out error of a trial's first model, then with each effect that was hidden."""
+    return game.fall(folder, opened)
+
+
+BENCH = (open_log, summary, abscissae, picture, select, exclude, suspects, with_effect, rivals, try_effect, truth)
 KEEP = (save_model, save_calibration, save_report, build_firmware)
 TASKS: dict[str, Callable[..., Any]] = {task.__name__: task for task in (*BENCH, *KEEP)}

@@ -76,8 +76,8 @@ class Worker:
         return self._line
 
     def _exchange(self, task: str, arguments: tuple, tick: Callable[[int], None] | None) -> Any:
-        line = self._ensure()
         try:
+            line = self._ensure()
             line.send((task, arguments))
             while True:
                 kind, value = line.recv()
