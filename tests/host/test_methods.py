@@ -1,11 +1,13 @@
 """The published methods on simulated truth: what they find, how sharply, and what they refuse."""
 
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 from barberpole.challenge.motion import directions, planar
 from barberpole.challenge.world import domain
+from barberpole.cli import app
 from barberpole.errors import InputError
 from barberpole.fit.fit import fit_log
 from barberpole.log import Log
@@ -13,7 +15,7 @@ from barberpole.methods.answer import Given
 from barberpole.methods.cross_axis import ANISOTROPY_UT, flipped, unflipped
 from barberpole.methods.ellipsoid import Ellipsoid, algebraic, cramer_rao, efficient
 from barberpole.methods.iterative import iterative
-from barberpole.methods.registry import METHODS, find_method
+from barberpole.methods.registry import ELSEWHERE, METHODS, find_method
 from barberpole.modelfile import read_model
 
 K_UT, SIGMA_UT = 50.0, 0.1
@@ -156,5 +158,13 @@ def test_every_method_says_what_it_is():
         assert method.needs
         assert method.words
         assert method.equations.startswith(("thesis", "article"))
+    commands = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    commands |= {g.name for g in app.registered_groups}
+    for where, equations, _ in ELSEWHERE:
+        assert equations.startswith(("thesis", "article"))
+        if where.startswith("python: "):
+            import_module(where.removeprefix("python: "))
+        else:
+            assert {words.split()[0] for words in where.split(", ")} <= {c.replace("_", "-") for c in commands}
     with pytest.raises(InputError, match="one of ellipsoid"):
         find_method("magic")

@@ -18,7 +18,7 @@ from barberpole.log import Log, read_log
 from barberpole.methods.answer import Answer, Given, Values
 from barberpole.methods.over_temperature import values_of
 from barberpole.methods.over_temperature_log import from_logs
-from barberpole.methods.registry import METHODS, find_method
+from barberpole.methods.registry import ELSEWHERE, METHODS, find_method
 from barberpole.modelfile import read_model
 
 FORMAT = 1
@@ -34,7 +34,8 @@ def methods(as_json: bool = AS_JSON) -> None:
     """The published methods: name, equations, the source's own words, what each needs of a log."""
     if as_json:
         fields = ("name", "equations", "words", "needs")
-        print_json({"methods": [{key: getattr(m, key) for key in fields} for m in METHODS]})
+        elsewhere = [dict(zip(("command", "equations", "words"), entry, strict=True)) for entry in ELSEWHERE]
+        print_json({"methods": [{key: getattr(m, key) for key in fields} for m in METHODS], "elsewhere": elsewhere})
         return
     shown = table("methods, for fit --method NAME", "name", "equations", "in the source", "needs")
     for column in shown.columns:
@@ -42,6 +43,12 @@ def methods(as_json: bool = AS_JSON) -> None:
     for m in METHODS:
         shown.add_row(m.name, m.equations, m.words, m.needs)
     OUT.print(shown)
+    others = table("the sources' other methods", "command or module", "equations", "in the source")
+    for column in others.columns:
+        column.justify = "left"
+    for entry in ELSEWHERE:
+        others.add_row(*entry)
+    OUT.print(others)
 
 
 def calibrate_over_temperature(

@@ -50,6 +50,37 @@ METHODS: tuple[Method, ...] = (
 )
 
 
+ELSEWHERE: tuple[tuple[str, str, str], ...] = (
+    (
+        "design flip",
+        "thesis 3.4.3, fig. 3.13-3.15",
+        "flipping as chopper, power of the flip circuit C V² f",
+    ),
+    ("design noise", "thesis 3.44-3.66, tables 3.1-3.2", "noise of the read-out electronics, brick-wall factors"),
+    ("design coil", "thesis 6.2, A.1-A.6", "Helmholtz coil, uniform region, angular error"),
+    ("design shield", "thesis B.1-B.5", "mu-metal box, attenuation factor of spheres and n-layer cylinders"),
+    ("trajectory", "thesis 6.1; article 2.4", "rotating a constant norm field vector; LIN-60000, sinusoidal field"),
+    ("imcs", "thesis 6.1, table 6.2", "indoor magnetometer calibration system, driver board, current read back"),
+    ("array", "thesis 6.2, 6.3-6.9, 1.2", "calibrating a gradiometer with three wires; gradient of the field"),
+    ("build, flash, verify", "thesis 6.2, fig. 6.23-6.26", "on-board solution, auto-calibration at power-up"),
+    ("calibrate-over-temperature", "thesis 6.1.3.2, table 6.1", "calibrations at different temperatures, many logs"),
+    (
+        "characterise",
+        "article 8-9, 13, table 1",
+        "frequency response, noise, misalignment, outliers",
+    ),
+    ("add cross_field", "thesis 3.9-3.14, 3.28-3.36, 5.1", "cross-field effect of the film, flipped and not"),
+    ("python: barberpole.navigation", "thesis 1.1, 1.2", "heading with declination; velocity from the gradient"),
+    (
+        "python: barberpole.law.supply",
+        "thesis 3.15-3.26, 3.37-3.43",
+        "voltage or current supply, drift of bias",
+    ),
+    ("python: barberpole.design.feedback", "thesis 5.1.1.2, table 5.1", "feedback loop, power dissipated"),
+)
+"""Command or module, equations, words of the source: the methods that are no fit of a log."""
+
+
 def find_method(name: str) -> Method:
     """The method of that name. Raises InputError with the known names."""
     for method in METHODS:
