@@ -165,7 +165,7 @@ def test_selected_points_know_their_rows():
 def test_noise_alone_is_called_noise():
     left = np.random.default_rng(3).normal(size=(3, 2000))
     figure = residual_against(left, np.linspace(0, 1, 2000), "time, s")
-    assert figure.title == "Nothing follows time"
+    assert figure.title == "No mean residual follows time"
     assert residual_axes({"x": 1.0}, 1.0).title == "Every axis is at the noise"
 
 

@@ -165,6 +165,8 @@ def test_the_twin_is_watched(tmp_path):
         watch.start()
         twin.wait_until(4.0)
         until(lambda: watch.total > 200)
+        watch.say("status")
+        until(lambda: watch.seen().answer.get("command") == "status")
         seen = watch.seen()
         watch.close()
     assert (seen.lost, seen.damaged) == (0, 0)

@@ -109,7 +109,7 @@ def _title(curves: Sequence[Curve], name: str, pattern: Pattern | None, unit: st
         return f"{pattern.axis} fails against {pattern.against}: {pattern.shape}"
     worst = max(curves, key=_significance)
     if _significance(worst) < 4.0:
-        return f"Nothing follows {name.split(',')[0]}"
+        return f"No mean residual follows {name.split(',')[0]}"
     swing = float(np.ptp(worst.mean_lsb))
     return f"{worst.axis} varies most with {name.split(',')[0]}: its mean moves by {plain(swing, 3)} {unit}"
 

@@ -67,6 +67,10 @@ class Live:
                 self._guide()
                 text_of("What the board says of itself", "h2", "bp-h").style("margin-top:14px")
                 self._verdict = text_of("No verdict yet.", "p").props("data-test=live-verdict")
+                with ui.element("div").classes("bp-chips"):
+                    press("Calibrate itself now", "bp-chip", lambda: watch.say("selfcal now"))
+                    press("Ask for its status", "bp-chip", lambda: watch.say("status"))
+                self._answer = text_of("", "p", "bp-small").props("data-test=live-answer").style("white-space:pre-line")
                 self._events = text_of("", "p", "bp-small").style("white-space:pre-line")
         ui.timer(EVERY_S, self._again)
 
@@ -88,6 +92,7 @@ class Live:
         self._state.text = _state(seen)
         self._about.text = _about(seen)
         self._verdict.text = _verdict(seen.verdict)
+        self._answer.text = "\n".join(f"{key}: {value}" for key, value in seen.answer.items() if key != "done")
         self._events.text = "\n".join(seen.events[-6:])
         self._record.text = "Stop recording" if seen.recording else "Record"
         if seen.total:

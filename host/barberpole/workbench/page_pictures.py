@@ -1,5 +1,6 @@
 """The pictures in the middle, the choice of what to draw against, and brushing: a box in one shows in all."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from nicegui import events, ui
@@ -112,6 +113,8 @@ class Pictures:
             return
         noise = self._session.noise_lsb
         figure = waterfall(stages, float("nan") if noise is None else noise)
+        if noise is None:
+            figure = replace(figure, title=f"The error is {stages[-1].heldout_lsb:.4g} LSB; the noise is not known yet")
         plot = figure.on(self._page.dark).plot.update_layout(height=PATH_HEIGHT, autosize=True, dragmode=False)
         self._path.show(Picture(plot.to_plotly_json() | {"config": CONFIG}, figure.title, figure.sentence))
 

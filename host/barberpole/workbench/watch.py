@@ -19,7 +19,7 @@ from barberpole.board_log import CODES
 from barberpole.errors import BarberpoleError, PortError, must
 from barberpole.link.mpremote import require_port
 from barberpole.link.record import RESTART
-from barberpole.records import EVENT, HEADER, RESULT, ROWS, Decoder, Frame
+from barberpole.records import ANSWER, EVENT, HEADER, RESULT, ROWS, Decoder, Frame
 from barberpole.workbench.rotation import Coverage
 
 KEPT = 4000  # rows in the ring
@@ -37,6 +37,7 @@ class Seen:
     state: str
     header: dict[str, Any]
     verdict: dict[str, Any]
+    answer: dict[str, Any]
     events: tuple[str, ...]
     rows: dict[str, np.ndarray]
     total: int
@@ -62,6 +63,7 @@ class Watch:
     state: str = "connecting"
     header: dict[str, Any] = field(default_factory=dict)
     verdict: dict[str, Any] = field(default_factory=dict)
+    answer: dict[str, Any] = field(default_factory=dict)
     events: deque = field(default_factory=lambda: deque(maxlen=EVENTS))
     coverage: Coverage = field(default_factory=Coverage)
 
@@ -107,6 +109,12 @@ class Watch:
             if self._line:
                 self._line.write(RESTART)
 
+    def say(self, command: str) -> None:
+        """A command of `barberpole.link.listen.COMMANDS` to the running program; its answer comes in `answer`."""
+        with contextlib.suppress(OSError):
+            if self._line:
+                self._line.write(b"\n" + command.encode() + b"\n")
+
     def forget_rotation(self) -> None:
         """Begin the guided rotation anew."""
         with self._lock:
@@ -124,6 +132,7 @@ class Watch:
                 self.state,
                 self.header,
                 self.verdict,
+                self.answer,
                 tuple(self.events),
                 rows,
                 self.total,
@@ -184,6 +193,8 @@ class Watch:
                 self.verdict = frame.json or {}
             elif frame.type == EVENT:
                 self.events.append(str((frame.json or {}).get("text", "")))
+            elif frame.type == ANSWER:
+                self.answer = frame.json or {}
             elif frame.type == ROWS and self._kind is not None and len(frame.payload) % self._kind.itemsize == 0:
                 rows.append(frame.payload)
         if rows and self._kind is not None:
