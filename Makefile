@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: trials demo test lint bench docs reproduce clean
+.PHONY: trials demo test lint bench docs pictures reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo
@@ -33,6 +33,10 @@ trials: $(STAMP)
 
 docs: $(STAMP)
 	@$(BIN)/python -m barberpole.docs host/docs
+
+# Pictures in host/docs, taken by chromium of the pages that the docs' commands write.
+pictures: $(STAMP)
+	@$(BIN)/python tests/web/pictures.py host/docs/pictures
 
 reproduce: $(STAMP)
 	@$(BIN)/python -m barberpole.reproduce host/docs/reproduction.md

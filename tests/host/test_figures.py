@@ -173,7 +173,7 @@ def test_the_waterfall_reaches_the_floor():
     history = [Step(50.0, 51.0), Step(2.0, 2.05, added="cross_field"), Step(3.0, 3.1, removed="bias")]
     stages = stages_of_history(history)
     assert [s.name for s in stages] == ["first model", "+ cross_field", "− bias"]
-    assert waterfall(stages[:2], 2.0).title == "The error falls from 51 to 2.05 LSB to the noise floor"
+    assert waterfall(stages[:2], 2.0).title == "The error falls from 51 to 2.05 LSB, the noise floor"
     assert waterfall(stages[:2], 2.0).plot.layout.yaxis.type == "log"
     assert waterfall([Stage("a", 3.0, 3.0), Stage("b", 2.5, 2.5)], 2.4).plot.layout.yaxis.type != "log"
     assert "times the noise floor" in waterfall(stages[:1], 2.0).title

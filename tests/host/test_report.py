@@ -110,7 +110,7 @@ def test_the_verdict_comes_first_and_titles_answer(page):
     assert body.index("1 missing; 1 adequate") < body.index("What does each log say?")
     assert body.index("quadratic is missing. The model leaves") < body.index("Does the model follow the measurement?")
     assert re.search(r"y fails most against field_y: quadratic in the y field, \+\d+ LSB at ±\d+ µT", body)
-    assert re.search(r"The error falls from [\d.]+ to [\d.]+ LSB to the noise floor", body)
+    assert re.search(r"The error falls from [\d.]+ to [\d.]+ LSB, the noise floor", body)
     assert "No parameter has changed" in body  # the calibration is of this very log
 
 

@@ -62,7 +62,7 @@ def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
     labels = [_label(s, before) for s, before in zip(stages, [None, *left[:-1]], strict=True)]
     figure.update_xaxes(tickvals=place, ticktext=labels, tickangle=0, range=[-0.5, len(place) - 0.5], showgrid=False)
     if steep:
-        figure.update_yaxes(type="log", **DECADES)
+        figure.update_yaxes(type="log", **(DECADES | {"dtick": "D2"}))
     else:
         figure.update_yaxes(rangemode="tozero")
     if np.isfinite(noise_lsb):
@@ -81,7 +81,7 @@ def _words(stages: Sequence[Stage], noise: float) -> tuple[str, str]:
     first, last = stages[0].heldout_lsb, stages[-1].heldout_lsb
     path = ", ".join(f"{s.name} {plain(s.heldout_lsb)}" for s in stages)
     sentence = f"Error on stretches never fitted, LSB rms: {path}; noise floor {plain(noise)}."
-    reached = " to the noise floor" if last < FLOOR * noise else ""
+    reached = ", the noise floor" if last < FLOOR * noise else ""
     if len(stages) == 1:
         return (f"The error is {'at' if reached else f'{plain(last / noise, 3)} times'} the noise floor", sentence)
     verb = "falls" if last < first else "rises"
