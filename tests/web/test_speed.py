@@ -60,7 +60,7 @@ def test_from_a_click_to_the_new_picture(window, long_log, n, wanted_s):
     back = window.evaluate(CLICK_TO_PICTURE, [".bp-step", PICTURE]) / 1e3
     said = f"against something else {against:.3f} s, effect added {added:.3f} s, step back {back:.3f} s"
     print(f"\nclick to picture, {n} rows (wanted {wanted_s} s): {said}", end="")
-    assert max(against, added, back) < 4 * wanted_s  # a busy machine is no failure, a lost order of magnitude is
+    assert max(against, added, back) < 8 * wanted_s  # a busy machine is no failure, a lost order of magnitude is
 
 
 def test_a_million_rows_stay_responsive(window, long_log, shots):

@@ -49,7 +49,7 @@ RULES = """
 .bp-card.named { border-color:var(--accent); background:color-mix(in srgb, var(--accent) 7%, var(--paper)); }
 .bp-card .name { font-weight:620; font-size:15px; }
 .bp-eq { font-family:"Latin Modern Math","STIX Two Math",Cambria,"DejaVu Serif",serif; font-size:14px; margin:3px 0;
-  overflow-x:auto; white-space:nowrap; scrollbar-width:none; }
+  line-height:1.3; overflow-wrap:anywhere; }
 .bp-small { font-size:12.5px; color:var(--quiet); }
 .bp-meter { height:5px; border-radius:3px; background:var(--grid); overflow:hidden; margin:6px 0 4px; }
 .bp-meter i { display:block; height:100%; background:var(--accent); }
@@ -81,14 +81,16 @@ RULES = """
 .bp-start h1 { font-size:28px; font-weight:650; letter-spacing:-.02em; margin:0 0 6px; line-height:1.15; }
 .bp-start h2 { font-size:16px; font-weight:620; margin:26px 0 8px; line-height:1.3; }
 .bp-levels { display:grid; grid-template-columns:repeat(auto-fill,minmax(165px,1fr)); gap:10px; }
-.bp-level { text-align:left; border:1px solid var(--grid); border-radius:8px; padding:12px; background:none;
+.bp-level { display:flex; flex-direction:column; text-align:left;
+  border:1px solid var(--grid); border-radius:8px; padding:12px; background:none;
   color:var(--ink); cursor:pointer; }
 .bp-level:hover { border-color:var(--accent); }
 .bp-level b { display:block; font-size:15px; }
 .bp-drop .q-uploader { width:100%; max-height:none; background:var(--raised); border:1.5px dashed var(--quiet);
   border-radius:10px; box-shadow:none; color:var(--ink); }
 .bp-drop .q-uploader__header { background:none; color:var(--ink); }
-.bp-drop .q-uploader__list { min-height:44px; padding:0; }
+.bp-drop .q-uploader__list { min-height:34px; padding:0; }
+.bp-drop .q-uploader__subtitle { display:none; }
 .bp-tab { border:0; background:none; color:var(--quiet); padding:6px 4px; cursor:pointer; font-size:14px;
   border-bottom:2px solid transparent; }
 .bp-tab[aria-selected=true] { color:var(--ink); border-color:var(--accent); font-weight:600; }

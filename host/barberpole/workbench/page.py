@@ -237,6 +237,6 @@ class Page:
         self.parts.update(
             history=[stack, history],
             fit=[verdict.show, history, parameters, pictures.draw],
-            suspects=[verdict.show, suspects, pictures.draw_path],
+            suspects=[verdict.show, suspects, pictures.judged],
             ground=[pictures.draw],
         )

@@ -41,6 +41,8 @@ class Pictures:
         self._page, self._session = page, page.session
         self.against = "t_s"
         self._box: Box | None = None
+        self._path_drawn: tuple | None = None
+        self._noise_drawn: float | None = None
         self._brush_bar()
         self._frames = {
             "residual": Frame("residual", HEIGHTS["residual"], self._chips),
@@ -95,14 +97,23 @@ class Pictures:
             self.against = "t_s"
         self._fill_chips()
         self._back.set_visibility(bool(self._session.bench.excluded))
+        await self._draw(("residual",))  # what is looked at first
         self.draw_path()
-        for name in ("residual", "traces", "sphere"):
+        for name in ("traces", "sphere"):
             await self._draw((name,))
 
     async def _draw(self, wanted: tuple[str, ...]) -> None:
         view = View(self.against, self._session.noise_lsb, self._page.dark)
+        if "residual" in wanted:
+            self._noise_drawn = view.noise_lsb
         for name, picture in (await self._session.pictures(view, wanted)).items():
             self._frames[name].show(picture)
+
+    async def judged(self) -> None:
+        """The noise may be known by now."""
+        self.draw_path()
+        if self._noise_drawn is None and self._session.noise_lsb is not None:
+            await self._draw(("residual",))
 
     def draw_path(self) -> None:
         """The error along the path."""
@@ -112,6 +123,9 @@ class Pictures:
         if not stages:
             return
         noise = self._session.noise_lsb
+        if self._path_drawn == (stages, noise, self._page.dark):
+            return
+        self._path_drawn = (stages, noise, self._page.dark)
         figure = waterfall(stages, float("nan") if noise is None else noise)
         if noise is None:
             figure = replace(figure, title=f"The error is {stages[-1].heldout_lsb:.4g} LSB; the noise is not known yet")

@@ -25,6 +25,7 @@ from barberpole.workbench.suspects import Suspect, Suspicion
 from barberpole.workbench.worker import Stopped, Worker
 
 TRIAL_S = 20.0  # for a user's own effect to show that it keeps its contract
+HEAD_START_S = 0.3  # for the pictures, which are waited for
 PATIENCE_S = 1.0  # an overtaken diagnosis that has run longer than this is stopped; a shorter one soon ends by itself
 
 Change = Callable[[str], None]
@@ -130,6 +131,7 @@ class Session:
 
     async def _think(self, bench: Bench) -> None:
         try:
+            await asyncio.sleep(HEAD_START_S)
             found = await self.mind.ask("suspects", bench)
         except Stopped:
             found = None
