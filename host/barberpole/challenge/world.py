@@ -209,4 +209,4 @@ def strength_for(name: str, rms_ut: float, scene: Scene) -> float:
     top = np.log(_LARGEST.get(name, 1e3))
     if excess(top) < 0:
         return float(np.exp(top))
-    return float(np.exp(brentq(excess, np.log(1e-12), top, xtol=1e-3)))
+    return float(np.exp(float(brentq(excess, np.log(1e-12), top, xtol=1e-3))))  # pyright: ignore[reportArgumentType]

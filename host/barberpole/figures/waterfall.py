@@ -62,7 +62,7 @@ def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
     labels = [_label(s, before) for s, before in zip(stages, [None, *left[:-1]], strict=True)]
     figure.update_xaxes(tickvals=place, ticktext=labels, tickangle=0, range=[-0.5, len(place) - 0.5], showgrid=False)
     if steep:
-        figure.update_yaxes(type="log", **(DECADES | {"dtick": "D2"}))
+        figure.update_yaxes(DECADES | {"type": "log", "dtick": "D2"})
     else:
         figure.update_yaxes(rangemode="tozero")
     if np.isfinite(noise_lsb):
