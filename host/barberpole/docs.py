@@ -8,6 +8,7 @@ from barberpole.board_tables import Board
 from barberpole.bring_up import bring_up
 from barberpole.driver_board import Driver
 from barberpole.files import write_atomic
+from barberpole.limits.page import page
 from barberpole.sensor import Sensor
 from barberpole.tables import describe, table_of
 
@@ -32,6 +33,7 @@ def write_docs(folder: Path) -> None:
     """Write all pages into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     write_atomic(folder / "boards.md", board_reference())
+    write_atomic(folder / "limits.md", page())
     write_atomic(folder / "bring-up.md", bring_up())
 
 

@@ -9,8 +9,8 @@ import pytest
 from barberpole.adding import change
 from barberpole.challenge.record import Recipe, record, rest
 from barberpole.diagnose import Diagnosis, diagnose, diagnose_observations
-from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.resting import longest_rest, noise_of
+from barberpole.fit.noise import Noise
 from barberpole.log import read_log
 from barberpole.observations import observations
 from truth.trials import BASE, confusion, judge, log_of, model_of, rates, trials

@@ -21,7 +21,7 @@ from barberpole.cli import run
 
 REPOSITORY = Path(__file__).parents[2]
 DOCS = REPOSITORY / "host" / "docs"
-GENERATED = ("boards.md", "reproduction.md", "physics.md")
+GENERATED = ("boards.md", "limits.md", "reproduction.md", "physics.md")
 PAGES = [REPOSITORY / "README.md", *sorted(page for page in DOCS.glob("*.md") if page.name not in GENERATED)]
 STAYS = ("twin", "workbench")
 PORT = "/dev/ttyACM0"

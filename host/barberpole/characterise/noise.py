@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import welch
 
-from barberpole.diagnose.noise import estimate
 from barberpole.errors import InputError, must
+from barberpole.fit.noise import estimate
 
 SEGMENTS = 8  # of a record, half overlapping
 LEAST_ROWS = 256

@@ -10,11 +10,11 @@ import numpy as np
 from barberpole.diagnose.curves import Curve, curves
 from barberpole.diagnose.evidence import examine
 from barberpole.diagnose.ground import Ground
-from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.patterns import Pattern, patterns
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
+from barberpole.fit.noise import Noise
 
 BANDS = 48  # of the spectrum, logarithmic
 MAP = (12, 24)  # of the sphere: bands of equal area in latitude, sectors in longitude

@@ -6,7 +6,7 @@ import numpy as np
 
 from barberpole.diagnose.covariates import Covariate
 from barberpole.diagnose.evidence import Evidence
-from barberpole.diagnose.noise import Noise
+from barberpole.fit.noise import Noise
 
 BINS = 20  # of a covariate at most
 LEAST = 5  # samples a bin

@@ -9,7 +9,6 @@ from barberpole.diagnose.answer import Diagnosis, at_rest_answer, inconclusive, 
 from barberpole.diagnose.candidates import Absent, absent_effects
 from barberpole.diagnose.evidence import Evidence, examine, unsure_of_noise
 from barberpole.diagnose.experiments import REST, next_experiment
-from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.patterns import JUMPS, Pattern, jump_patterns, patterns
 from barberpole.diagnose.resting import noise_of, noise_within
 from barberpole.diagnose.search import Found, giant_readings, linear_drop, recheck, search
@@ -20,6 +19,7 @@ from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
 from barberpole.fit.fit import Fit, fit_observations
+from barberpole.fit.noise import Noise
 from barberpole.log import Log
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations, observations

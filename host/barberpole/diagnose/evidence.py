@@ -10,11 +10,11 @@ from barberpole.diagnose.candidates import Absent, candidates
 from barberpole.diagnose.columns import Candidate
 from barberpole.diagnose.covariates import Covariate, covariates, ripples
 from barberpole.diagnose.ground import Ground, ground_of
-from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.table import Design, Products, Projection, Table, multiply, parts_of, project, tabulate
 from barberpole.diagnose.whitening import Whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import MAD, OUTLIER, Fit
+from barberpole.fit.noise import Noise, estimate
 
 ENOUGH_ROWS = 8  # residuals a column: with fewer, the colour of the noise is lost in what the columns take
 FEW = 4  # residuals a column: with fewer, what is left of them is no noise

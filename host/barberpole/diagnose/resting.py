@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from barberpole.diagnose.noise import Noise, estimate
+from barberpole.fit.noise import Noise, estimate
 from barberpole.observations import Observations
 
 BLOCK = 20  # samples whose medians are compared

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.whitening import Whitening
 from barberpole.fit.gram import BLOCKS, FOLDS, block_edges
+from barberpole.fit.noise import Noise
 
 ALIKE = 1e-8  # squared sine of the angle between columns below which they are one
 SEEN = 2.5e-3  # of a column's energy that must survive the baseline: 5 % of its RMS

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import nnls
 
-from barberpole.diagnose.noise import Noise, power_law
+from barberpole.fit.noise import Noise, power_law
 
 SPACING = 6.0  # between the corner frequencies of the processes
 SEGMENT = 4096  # samples

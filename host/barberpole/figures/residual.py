@@ -7,10 +7,10 @@ import plotly.graph_objects as go
 
 from barberpole.diagnose import Comparison, Pattern
 from barberpole.diagnose.curves import Curve, binned
-from barberpole.diagnose.noise import Noise
 from barberpole.figures.decimate import scattered, thin
 from barberpole.figures.figure import Figure, listed, noise_band, noise_line, panels, plot
 from barberpole.figures.theme import GREY, look
+from barberpole.fit.noise import Noise
 from barberpole.numbers import plain, signed
 
 CLEAR = 1.1  # times the noise: an axis above it has more than noise

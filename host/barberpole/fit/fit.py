@@ -10,11 +10,13 @@ from barberpole.effects import Effect, Setup, find_effect
 from barberpole.errors import InputError
 from barberpole.fit import observability
 from barberpole.fit.affine import moments
-from barberpole.fit.ellipsoid import coverage_message
 from barberpole.fit.gram import Gram, Tick, heldout_rms
+from barberpole.fit.honest import factors
 from barberpole.fit.residual import Problem
 from barberpole.fit.solve import Measured, Solution, minimise
+from barberpole.fit.spikes import no_surface
 from barberpole.fit.start import Linear, linear_part, start_values
+from barberpole.fit.usable import require_usable
 from barberpole.fit.whole import Figures, figures
 from barberpole.log import Log
 from barberpole.model import Model, compose
@@ -31,7 +33,7 @@ NOMINAL_MAGNITUDE_UT = 50.0  # where only its constancy is known; the scale is t
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model: the problem, the parameters p (P,) and covariance (P, P), and how well it does.
+    """A fitted model: the problem, the parameters p (P,), their covariance (P, P) in white noise, how well it does.
 
     rms_lsb over all residuals; heldout_rms_lsb over stretches fitted without them; unobservable: names of parameters
     that this log cannot determine, which stay at their null. held: names of parameters that were not to be fitted.
@@ -40,7 +42,7 @@ class Fit:
 
     problem: Problem
     p: np.ndarray
-    covariance: np.ndarray
+    white: np.ndarray
     gram: Gram
     free: np.ndarray
     converged: bool
@@ -53,6 +55,12 @@ class Fit:
     @property
     def model(self) -> Model:
         return self.problem.model
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(P, P) of the parameters, wider than `white` where the residual asks for it (`fit.honest`)."""
+        wider = factors(self)
+        return self.white * np.outer(wider, wider)
 
     @property
     def stderr(self) -> np.ndarray:
@@ -117,6 +125,7 @@ def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     taken = None if seen.b_ut is None else moments(seen.y, seen.b_ut)
     linear = linear_part(seen, magnitude, taken)
+    require_usable(seen, linear, magnitude)
     setup = setup_of(seen, linear)
     known = {find_effect(n, extra).name: replace(setup, settings=file.settings.get(n, {})) for n in file.effects}
     model = compose(file.effects, known, extra)
@@ -216,7 +225,7 @@ def fit_problem(
         problem = replace(problem, believed=believed)
         solution = determined(problem, solution.p, solution.free, tick)
     if not problem.vector and problem.thinnest < THIN * solution.gram.rms():
-        raise InputError(coverage_message(problem.seen.y))
+        raise InputError(no_surface(problem.seen.y))
     cov = observability.covariance(solution.gram, solution.free)
     return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra, held)
 

@@ -135,6 +135,10 @@ class Problem:
         across = np.sum(cofactor * cofactor, axis=(0, 1)) / (det * det) - steep * steep
         return (norm - known) / steep, gradient / steep, across / (2.0 * known * steep), field, slope
 
+    def normal(self, p: np.ndarray) -> np.ndarray:
+        """(3, n) unit normals of the surface, in reading space: along them a scalar residual is measured."""
+        return np.concatenate([self._distance(p, rows)[1] for rows in self.chunks()], axis=1)
+
     def _with_memory(self, p: np.ndarray, rows: slice) -> Linearised:
         """The same where the fitted field of a sample depends on earlier readings.
 

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from barberpole.effects.misalignment import LOWER, UPPER
+from barberpole.errors import InputError
 from barberpole.fit.affine import Moments, moments
 from barberpole.fit.ellipsoid import Ellipsoid, algebraic
+from barberpole.fit.spikes import isolated
 from barberpole.model import Model
 from barberpole.observations import Observations
 
@@ -56,7 +58,7 @@ def _bridge(seen: Observations) -> np.ndarray:
 
 def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
     """The algebraic ellipsoid of readings (3, n), repeated without those far off it: its squares square an outlier."""
-    shape, kept = algebraic(y, magnitude_ut), np.ones(y.shape[1], bool)
+    shape, kept = _first(y, magnitude_ut), np.ones(y.shape[1], bool)
     for _ in range(TRIMS):
         field = shape.field(y)
         apart = np.abs(np.sqrt(np.einsum("ik,ik->k", field, field)) - magnitude_ut)
@@ -65,6 +67,17 @@ def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
             break
         shape, kept = algebraic(y[:, near], magnitude_ut), near
     return shape
+
+
+def _first(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
+    """Through all readings, or where they allow none, through those that are no spikes."""
+    try:
+        return algebraic(y, magnitude_ut)
+    except InputError:
+        alone = isolated(y)
+        if not alone.any():
+            raise
+    return algebraic(y[:, ~alone], magnitude_ut)
 
 
 def start_values(model: Model, linear: Linear) -> np.ndarray:

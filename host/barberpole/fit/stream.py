@@ -94,7 +94,7 @@ def fit_stream(
     found = replace(
         first,
         p=solution.p,
-        covariance=observability.covariance(solution.gram, solution.free),
+        white=observability.covariance(solution.gram, solution.free),
         gram=solution.gram,
         free=solution.free,
         converged=solution.converged,

@@ -13,11 +13,11 @@ import numpy as np
 
 from barberpole.diagnose.candidates import absent_effects
 from barberpole.diagnose.evidence import FEW, Evidence, examine
-from barberpole.diagnose.noise import Noise, estimate
 from barberpole.diagnose.table import SEEN
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
+from barberpole.fit.noise import Noise, estimate
 from barberpole.modelfile import ModelFile
 
 STANDARD = {"mains": {"frequency_hz": 50.0}}  # where the model file does not say otherwise

@@ -9,6 +9,7 @@ import numpy as np
 
 from barberpole.errors import InputError, must
 from barberpole.fit.ellipsoid import Ellipsoid, coverage_message
+from barberpole.fit.spikes import NO_SPIKES, said_of_spikes
 from barberpole.methods.ellipsoid import certainty
 
 LEAST_ROWS = 18  # twice the nine unknowns: with fewer the residual says too little about the noise
@@ -23,6 +24,11 @@ SPIKE = 10.0  # residual over the robust deviation that makes a row that stands 
 FEW = 0.05  # of the rows, that may be called spikes
 BESIDE = 5  # rows on either side that a spike stands out from
 SPIKES_SHARE = 0.5  # of the sum of squares: what a few rows must hold to rule the fit
+WINDOW = 10  # rows that are taken together
+LEAST_WINDOWS = 20
+APART = 10.0  # times the usual power of a window
+SHORT = 0.2  # of the log, in which a stretch must lie
+HELD = 0.6  # of the sum of squares that it must hold
 ROUNDING = 1e-6  # of the range: below, a residual is arithmetic
 
 
@@ -87,6 +93,27 @@ def require_no_spikes(left: np.ndarray, size: float, where: object) -> None:
     around = np.clip(out[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, far.size - 1)
     alone = out[far[out] > SPIKE * np.median(far[around], axis=1)]
     if np.sum(far[alone] ** 2) > SPIKES_SHARE * np.sum(far**2):
-        got = f"{alone.size} of {far.size} that stand alone, the first in row {alone[0] + 1}"
-        wanted = "free of spikes (take those rows out, or fit without --method with the effect outliers)"
+        mask = np.zeros(far.size, bool)
+        mask[alone] = True
+        raise InputError(must("the readings", NO_SPIKES, said_of_spikes(mask), where))
+
+
+def require_no_stretch(left: np.ndarray, where: object) -> None:
+    """Raise InputError where one short stretch holds nearly all of what a fit left, (n,) or (3, n): a magnet passed
+    by. What is wrong in it must go the same way for many rows; noise that rises and falls does not."""
+    left = np.atleast_2d(left)
+    count = left.shape[1] // WINDOW
+    if count < LEAST_WINDOWS:
+        return
+    parts = left[:, : count * WINDOW].reshape(len(left), count, WINDOW)
+    power = WINDOW * np.sum(parts.mean(axis=2) ** 2, axis=0)
+    noise = np.sum(np.mean(np.diff(parts, axis=2) ** 2, axis=2), axis=0) / 2.0
+    high = np.flatnonzero((power > APART * np.median(power)) & (power > APART * noise))
+    if not high.size:
+        return
+    first, last = int(high[0]), int(high[-1]) + 1
+    held = float(np.sum(power[first:last]))
+    if last - first <= SHORT * count and held > HELD * float(np.sum(left**2)):
+        wanted = "of one piece (take those rows out: did something magnetic pass by?)"
+        got = f"rows {first * WINDOW + 1} to {last * WINDOW} that lie apart from all others"
         raise InputError(must("the readings", wanted, got, where))

@@ -16,6 +16,7 @@ import numpy as np
 
 from barberpole.calibration import Calibration
 from barberpole.errors import InputError, must
+from barberpole.fit.usable import require_microtesla
 from barberpole.fitted import from_calibration
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
@@ -60,6 +61,7 @@ def offset_coil(log: Log, given: Given) -> Answer:
     current_ma = require_driven(seen, log.path)
     ut_per_ma = given.sensor.offset_coil_ut_per_ma if given.sensor else NOMINAL_UT_PER_MA
     coil_ut = ut_per_ma * current_ma
+    require_microtesla(float(np.max(np.linalg.norm(coil_ut, axis=0))), "the field of the offset coils")
     require_regular(seen.y, coil_ut, log.path)
     found = linear_model(seen.y, coil_ut)
     require_followed(found, seen.y, coil_ut, "the coil currents", log.path)

@@ -11,13 +11,15 @@ from barberpole.fit.gram import accumulate
 from barberpole.fit.observability import covariance
 from barberpole.fit.residual import Problem
 from barberpole.fit.start import Linear, start_values
+from barberpole.fit.usable import require_in_range, require_microtesla, require_one_field
 from barberpole.log import Log
-from barberpole.methods.guards import require_moving, require_no_spikes
+from barberpole.methods.guards import require_moving, require_no_spikes, require_no_stretch
 from barberpole.model import compose
 from barberpole.observations import Observations, observations
 
 LINEAR_EFFECTS = ("bias", "scale", "misalignment")
 SAME = 1e-3  # relative spread of a field magnitude that still counts as one
+NEAR_NULL = 0.1  # of the largest applied field: below it a ratio to it says nothing
 FLAT = 1e-3  # smallest over largest direction of an applied field that still spans space
 
 
@@ -30,6 +32,7 @@ def demodulated(log: Log, what: str) -> Observations:
         got = "SET and RESET in turns in x_lsb.. (fit without --method takes them)"
         raise InputError(must(what, "given demodulated readings", got, log.path))
     require_moving(seen.y, what, log.path)
+    require_in_range(seen.y)
     return seen
 
 
@@ -42,9 +45,10 @@ def scalar(log: Log, what: str) -> Observations:
 
 def one_magnitude(seen: Observations, otherwise_ut: float, what: str, where: object) -> float:
     """K in µT: the log's, or `otherwise_ut`. Raises InputError if the log's is not one number."""
+    known = otherwise_ut if seen.b_mag is None else float(np.mean(seen.b_mag))
+    require_microtesla(known)
     if seen.b_mag is None:
-        return otherwise_ut
-    known = float(np.mean(seen.b_mag))
+        return known
     if np.ptp(seen.b_mag) > SAME * known:
         got = f"b_ut from {seen.b_mag.min():.4g} to {seen.b_mag.max():.4g} µT (fit without --method takes them all)"
         raise InputError(must(what, "given one field magnitude", got, where))
@@ -60,18 +64,25 @@ def vector(log: Log, what: str, parameters: int) -> tuple[Observations, np.ndarr
     if seen.b_ut is None:
         raise InputError(must(what, "given the applied field bx_ut, by_ut, bz_ut", "a log without it", log.path))
     _require_span(seen.b_ut, what, parameters, log.path)
+    require_microtesla(float(np.max(np.linalg.norm(seen.b_ut, axis=0))))
     require_regular(seen.y, seen.b_ut, log.path)
     return seen, seen.b_ut
 
 
 def require_regular(reading: np.ndarray, field_ut: np.ndarray, where: object) -> None:
-    """Raise InputError where spikes rule a fit of readings (3, n) and known fields (3, n).
+    """Raise InputError where spikes, one stretch or a second field rule a fit of readings (3, n) and fields (3, n).
 
     The readings are regressed on the field, which is free of errors, so that a spike cannot hide by its leverage.
     """
     columns = np.vstack([field_ut, np.ones(field_ut.shape[1])]).T
-    left = reading.T - columns @ np.linalg.lstsq(columns, reading.T, rcond=None)[0]
-    require_no_spikes(left.T, float(np.max(np.ptp(reading, axis=1))), where)
+    found = np.linalg.lstsq(columns, reading.T, rcond=None)[0]
+    left = (reading.T - columns @ found).T
+    require_no_spikes(left, float(np.max(np.ptp(reading, axis=1))), where)
+    require_no_stretch(left, where)
+    size = np.linalg.norm(field_ut, axis=0)
+    usable = size > NEAR_NULL * size.max()
+    seen = np.linalg.norm(np.linalg.pinv(found[:3].T) @ (reading - found[3][:, None]), axis=0)
+    require_one_field(np.where(usable, seen / np.where(usable, size, 1.0), 1.0), [], np.arange(size.size))
 
 
 def _require_span(field_ut: np.ndarray, what: str, parameters: int, where: object) -> None:

@@ -7,11 +7,19 @@ import numpy as np
 
 from barberpole.errors import InputError
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
+from barberpole.fit.spikes import isolated, no_surface
 from barberpole.fit.start import Linear
+from barberpole.fit.usable import require_one_field
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
 from barberpole.methods.ellipsoid import Ellipsoid, algebraic, certainty, coverage_message, efficient
-from barberpole.methods.guards import LEAST_ROWS, require_determined, require_no_spikes, require_rows
+from barberpole.methods.guards import (
+    LEAST_ROWS,
+    require_determined,
+    require_no_spikes,
+    require_no_stretch,
+    require_rows,
+)
 from barberpole.methods.iterative import iterative
 from barberpole.methods.readings import LINEAR_EFFECTS, judged, one_magnitude, scalar
 from barberpole.modelfile import ModelFile
@@ -91,6 +99,19 @@ def _misfit_rms(shape: Ellipsoid, seen: Observations, known: float) -> float:
 def require_seen(seen: Observations, known: float, where: object = "") -> None:
     """Raise InputError where readings in a field of one magnitude do not determine an ellipsoid, or spikes rule it."""
     require_rows(seen.y.shape[1], LEAST_ROWS, WHAT, where)
-    shape = algebraic(seen.y, known)
-    require_no_spikes(np.linalg.norm(shape.field(seen.y), axis=0) - known, known, where)
+    shape = _surface(seen.y, known, where)
+    left = np.linalg.norm(shape.field(seen.y), axis=0) - known
+    require_no_spikes(left, known, where)
+    require_no_stretch(left, where)
+    require_one_field(1.0 + left / known, [], seen.row)
     require_determined(shape, seen.y, known)
+
+
+def _surface(reading: np.ndarray, known: float, where: object) -> Ellipsoid:
+    """The algebraic ellipsoid. Raises InputError that names spikes where these leave none."""
+    try:
+        return algebraic(reading, known)
+    except InputError:
+        if isolated(reading).any():
+            raise InputError(f"{no_surface(reading)} ({where})") from None
+        raise

@@ -12,7 +12,6 @@ import numpy as np
 from barberpole.calibrating import calibration_of
 from barberpole.calibration import Calibration, Value
 from barberpole.diagnose import Comparison, Diagnosis, compare, diagnose
-from barberpole.diagnose.noise import Noise
 from barberpole.diagnose.resting import noise_of
 from barberpole.effects import Effect, find_effect
 from barberpole.errors import InputError
@@ -20,6 +19,7 @@ from barberpole.figures.parameters import change_sigma
 from barberpole.figures.waterfall import Stage, stages_of_diagnosis, stages_of_history
 from barberpole.fit.answer import fit_json
 from barberpole.fit.fit import Fit, fit_observations
+from barberpole.fit.noise import Noise
 from barberpole.fitted import from_calibration
 from barberpole.log import Log
 from barberpole.modelfile import ModelFile

@@ -15,6 +15,7 @@ EXPONENTS = np.linspace(0.6, 2.0, 8)
 CORNERS = np.geomspace(2e-4, 2.0, 25)  # cycles a sample
 BINS = 64  # of the periodogram, logarithmic: enough for three parameters
 COLOURED = 16.0  # gain in -2 log likelihood that a corner must bring
+NEGLIGIBLE = 1e-4  # weight of a law in a mean
 LEAST_KEPT = 0.05  # of the power of a bin: less says nothing
 
 
@@ -72,6 +73,43 @@ def estimate(
     kept (m, n // 2 + 1): part of the power that a fit has left at each frequency. normal (3, n): of a scalar residual,
     along which the noise of the three axes was taken while the sensor turned.
     """
+    found = _trials(channels, kept, normal)
+    best = int(np.argmin(found.deviance))
+    if found.deviance[0] - found.deviance[best] < COLOURED:
+        best = 0
+    return Noise(found.levels[best], *(float(v) for v in found.laws[best]), source=source)
+
+
+def expected(
+    channels: np.ndarray, f: np.ndarray, kept: np.ndarray | None = None, normal: np.ndarray | None = None
+) -> np.ndarray | None:
+    """Spectrum (m, k) at frequencies f (k,) > 0: the mean of all power laws, each as likely as it makes these channels.
+
+    None where they are white. A short record hardly tells the exponent; the mean holds the steep ones too.
+    """
+    found = _trials(channels, kept, normal)
+    if found.deviance[0] - found.deviance.min() < COLOURED:
+        return None
+    weight = np.exp(-0.5 * (found.deviance - found.deviance.min()))
+    weight /= weight.sum()
+    terms = [
+        w * level[:, None] * power_law(f, *law)
+        for w, level, law in zip(weight, found.levels, found.laws, strict=True)
+        if w > NEGLIGIBLE
+    ]
+    return np.sum(terms, axis=0)
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Corner and exponent of each law tried, white first; deviance (k,) and white level (k, m) of each."""
+
+    laws: list[tuple[float, float]]
+    deviance: np.ndarray
+    levels: np.ndarray
+
+
+def _trials(channels: np.ndarray, kept: np.ndarray | None, normal: np.ndarray | None) -> _Trials:
     n = channels.shape[1]
     bins, f = _edges(n), frequencies(n)
     power = np.abs(rfft(channels - channels.mean(axis=1, keepdims=True), axis=1)) ** 2 / n
@@ -79,14 +117,11 @@ def estimate(
     part = _binned(kept, bins)
     binned, weight = _binned(power, bins) / np.maximum(part, LEAST_KEPT), np.diff(bins) * np.maximum(part, 1e-9)
     turning = None if normal is None else _turning(normal)
-    trials = [(0.0, 1.0)] + [(c, a) for c in CORNERS[1.0 / n < CORNERS] for a in EXPONENTS]
-    shapes = [_binned(_seen_turning(power_law(f, c, a), turning, n)[None], bins)[0] for c, a in trials]
-    deviance = [_deviance(binned, weight, shape) for shape in shapes]
-    best = int(np.argmin(deviance))
-    if deviance[0] - deviance[best] < COLOURED:
-        best = 0
-    level = np.sum(binned / shapes[best] * weight, axis=1) / weight.sum(axis=1)
-    return Noise(level, *(float(v) for v in trials[best]), source=source)
+    laws = [(0.0, 1.0)] + [(c, a) for c in CORNERS[1.0 / n < CORNERS] for a in EXPONENTS]
+    shapes = [_binned(_seen_turning(power_law(f, c, a), turning, n)[None], bins)[0] for c, a in laws]
+    deviance = np.array([_deviance(binned, weight, shape) for shape in shapes])
+    levels = np.array([np.sum(binned / shape * weight, axis=1) / weight.sum(axis=1) for shape in shapes])
+    return _Trials(laws, deviance, levels)
 
 
 def _turning(normal: np.ndarray) -> np.ndarray:
