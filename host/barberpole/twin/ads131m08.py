@@ -10,6 +10,8 @@ import math
 import struct
 from collections import deque
 
+import numpy as np
+
 from barberpole.twin.analog import AnalogInputs
 
 CHANNELS = 8
@@ -45,6 +47,7 @@ class Ads131m08:
         self._in = bytearray()
         self._out = b""
         self._period_us = self._start_us = 0.0
+        self._coming: list[tuple[float, list[int]]] = []  # conversions that were told ahead
         self.delivered_us = 0.0  # end of the conversion that was read last
         self.reset(0.0)
 
@@ -103,6 +106,39 @@ class Ads131m08:
         at = len(self._in)
         self._in += data
         return self._out[at : at + len(data)].ljust(len(data), b"\0")
+
+    def ahead(self, most: int) -> tuple[list[int], bytes]:
+        """The next frames, up to `most`, if each is read in its time and nothing else happens; as of Wiring.ahead.
+
+        Nothing is changed by asking: a frame counts when `take` says so. None but after a read that was no command.
+        """
+        quiet = self._silent or self._standby or self._low_since is not None
+        if quiet or len(self._in) != FRAME_BYTES or any(self._in):
+            return [], b""
+        self._coming = list(self._fifo)[:most]
+        ends_us = [self._end_us(self._next + i) for i in range(max(most - len(self._coming), 0) + 2)]
+        codes = self._convert_ahead(ends_us[:-2])
+        if not self._coming and not len(codes):
+            return [], b""
+        ends_us = [end_us for end_us, _ in self._coming] + ends_us[: len(codes) + 2]
+        waiting = np.array([c for _, c in self._coming], np.int64).reshape(-1, CHANNELS)
+        self._coming += zip(ends_us[len(waiting) :], codes.tolist(), strict=False)
+        return [math.ceil(end_us) for end_us in ends_us], framed(self._status(0xFF), np.concatenate([waiting, codes]))
+
+    def _convert_ahead(self, ends_us: list[float]) -> np.ndarray:
+        """Codes (n, CHANNELS) of the conversions that end at these times, up to the first that cannot be told yet."""
+        volts = self._inputs.ahead(ends_us, self._period_us)
+        if self._stuck and self._stuck_codes is not None:
+            return np.array([self._stuck_codes] * len(volts), np.int64).reshape(-1, CHANNELS)
+        return np.clip(np.rint(volts * self._codes_per_v), -FULL_SCALE, FULL_SCALE - 1).astype(np.int64)
+
+    def take(self) -> None:
+        """The first of the frames ahead has been read."""
+        if self._fifo:
+            self._fifo.popleft()
+        else:
+            self._next += 1
+        self.delivered_us, self._last = self._coming.pop(0)
 
     def deselect(self, t_us: float) -> bool:
         """Chip select goes high: obey the command. True when the pace of the conversions may have changed."""
@@ -193,6 +229,19 @@ class Ads131m08:
         else:
             words = [(answer[0] if answer else self._status(new_data)) << 8, *self._last]
         return checked(words)
+
+
+def framed(status: int, codes: np.ndarray) -> bytes:
+    """The frames of conversions with these codes (n, CHANNELS): status, data, checksum."""
+    words = np.empty((len(codes), 1 + CHANNELS), ">u4")
+    words[:, 0] = status << 8
+    words[:, 1:] = codes & 0xFFFFFF
+    frames = np.zeros((len(codes), FRAME_BYTES), np.uint8)
+    frames[:, :-WORD_BYTES] = words.view(np.uint8).reshape(len(codes), -1, 4)[:, :, 1:].reshape(len(codes), -1)
+    data = frames.tobytes()
+    starts = range(0, len(data), FRAME_BYTES)
+    parts = [data[at : at + FRAME_BYTES - WORD_BYTES] for at in starts]
+    return b"".join([part + struct.pack(">HB", binascii.crc_hqx(part, 0xFFFF), 0) for part in parts])
 
 
 def checked(words: list[int]) -> bytes:

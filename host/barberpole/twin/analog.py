@@ -5,8 +5,10 @@ the filter has settled, and what is not settled yet is taken off the present vol
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
+
+import numpy as np
 
 from barberpole.board import Board
 from barberpole.twin.noise import Noise, NoiseLevel
@@ -24,6 +26,10 @@ class Head(Protocol):
 
     def volts(self, t_s: float) -> list[float]:
         """Voltage on every input at t_s, without noise; the same list while nothing changes, or a new one."""
+        ...
+
+    def still_until(self, t_s: float) -> float:
+        """Time in s before which what the voltages hang on is known not to move by itself."""
         ...
 
 
@@ -45,13 +51,28 @@ class AnalogInputs:
             self._forget(t_us, LONGEST_PERIOD_US)
             self._steps.append((t_us, [b - a for a, b in zip(before, after, strict=True)]))
 
+    def ahead(self, ends_us: Sequence[float], period_us: float) -> np.ndarray:
+        """Volts (n, INPUTS) of the conversions that end then, up to the first that cannot be told before its time."""
+        times_s = [self._middle_s(end_us, period_us) for end_us in ends_us]
+        count = next((i for i, t_s in enumerate(times_s) if not t_s < self.head.still_until(t_s)), len(times_s))
+        if not count:
+            return np.empty((0, INPUTS))
+        volts = np.array([self.head.volts(times_s[0])] * count)
+        for at_us, delta in self._steps:
+            shares = [1.0 - sinc3_step((end_us - at_us) / period_us) for end_us in ends_us[:count]]
+            volts -= np.outer(shares, delta)
+        return volts + [self._noise.at(int(end_us // period_us)) for end_us in ends_us[:count]]
+
     def converted(self, end_us: float, period_us: float) -> list[float]:
         """Volts of the conversion that ends at end_us, one per input."""
-        volts = self.head.volts((end_us - 0.5 * FILTER_PERIODS * period_us) * 1e-6)
+        volts = self.head.volts(self._middle_s(end_us, period_us))
         if self._steps:
             volts = self._unsettled(volts, end_us, period_us)
         noise = self._noise.at(int(end_us // period_us))
         return [v + n for v, n in zip(volts, noise, strict=True)]
+
+    def _middle_s(self, end_us: float, period_us: float) -> float:
+        return (end_us - 0.5 * FILTER_PERIODS * period_us) * 1e-6
 
     def _unsettled(self, volts: list[float], end_us: float, period_us: float) -> list[float]:
         self._forget(end_us, period_us)

@@ -111,15 +111,17 @@ class Twin:
         seed: int | None = None,
         faults: Iterable[str] | None = None,
         cut_s: float = math.inf,
+        wrap_s: float = 0.0,
     ) -> None:
         """Off and on again: same flash, fresh chips, new magnetisation; what is given replaces what it was.
 
-        cut_s: board time in s at which the power goes away again, until the next call.
+        cut_s: board time in s at which the power goes away again, until the next call. wrap_s: board time at which
+        time.ticks_us and ticks_ms, which end at 2^30, begin at 0 again; 0: they begin with the power, as on a board.
         """
         self.world = self.world if world is None else world
         self._seed = self._seed if seed is None else check_seed(seed)
         self._faults = self._faults if faults is None else check_faults(faults)
-        self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s))
+        self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s, wrap_s))
 
     def kill(self) -> None:
         """Pull the plug now; the board stays off until `power_cycle`."""

@@ -4,7 +4,7 @@ The coils are copper: their resistance follows the temperature, and with a volta
 is why the currents are read back (thesis 6.1.2.1).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -66,6 +66,10 @@ class DrivenCoils:
             volts[getattr(channels, f"coil_{name}")] = 1e-3 * current_ma * self.driver.adc.coil_shunt_ohm
         return volts
 
+    def still_until(self, t_s: float) -> float:
+        """Time in s before which the temperature stays as it is at t_s."""
+        return self.world.temperature.constant_until(t_s)
+
 
 class Wired:
     """Everything on the driver but its microcontroller, as `Soldered` is of a sensor board. Times in µs."""
@@ -106,6 +110,15 @@ class Wired:
     def ready_at(self, t_us: int) -> int:
         """When the converter's data-ready goes low, µs."""
         return self._adc.ready_at(t_us)
+
+    def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
+        """Frames that the converter will say next, as of Wiring."""
+        return self._adc.ahead(most) if self._selected[self._driver.adc.cs_pin] else ((), b"")
+
+    def take(self, count: int) -> None:
+        """So many of them were read."""
+        for _ in range(count):
+            self._adc.take()
 
     def take_charge_us(self) -> int:
         """Its arithmetic fits into the hold, which is timed."""

@@ -34,6 +34,7 @@ class Noise:
         self._key = (seed, power_up)
         self._first = -1
         self._rows: list[list[float]] = []
+        self._former: tuple[int, list[list[float]]] = (-1, [])  # 1/f noise cannot be drawn backwards
         self._has_flicker = any(level.flicker_v2)
         self._taus_s = FASTEST_S * RATIO ** np.arange(1 + math.log(SLOWEST_S / FASTEST_S, RATIO))
         self._slow = np.zeros((len(self._taus_s), len(level.white_v)))
@@ -45,6 +46,9 @@ class Noise:
         """Volts on every input at conversion `index`."""
         row = index - self._first
         if self._first < 0 or not 0 <= row < BLOCK:
+            if 0 <= index - self._former[0] < BLOCK and self._former[1]:
+                return self._former[1][index - self._former[0]]
+            self._former = (self._first, self._rows)
             self._draw(index // BLOCK)
             row = index - self._first
         return self._rows[row]

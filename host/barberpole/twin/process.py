@@ -32,6 +32,8 @@ class Power:
     faults: frozenset[str]
     cut_s: float = math.inf
     """s. Board time at which the power goes away again."""
+    wrap_s: float = 0.0
+    """s. Board time at which the ticks begin at 0 again."""
 
 
 class BoardProcess:
@@ -133,9 +135,8 @@ class BoardProcess:
         cut_us = NEVER_US if math.isinf(self._power.cut_s) else math.ceil(1e6 * self._power.cut_s)
         self._start_us = now_us
         self._soldered.release_pins(now_us)
-        self._running = Running(
-            self._job, self._soldered, Start(cause, raw, now_us, cut_us, self._power.faults), self._say
-        )
+        start = Start(cause, raw, now_us, cut_us, round(1e6 * self._power.wrap_s), self._power.faults)
+        self._running = Running(self._job, self._soldered, start, self._say)
         self._watch(self._running.wire_fd, True)
 
     def _end(self) -> Ending:

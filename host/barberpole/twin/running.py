@@ -47,6 +47,8 @@ class Start:
     """µs. Board time."""
     cut_us: int = NEVER_US
     """µs. Board time at which the power goes."""
+    wrap_us: int = 0
+    """µs. Board time at which the ticks begin at 0 again."""
     faults: frozenset[str] = frozenset()
 
 
@@ -101,6 +103,7 @@ class Running:
             "from": source,
             "now": start.now_us,
             "cut": start.cut_us,
+            "wrap": start.wrap_us,
             "raw": start.raw,
             "cause": start.cause,
             "image": str(job.image),
@@ -110,6 +113,7 @@ class Running:
             "pins": PINS,
             "drdy": board.adc.drdy_pin,
             "adc_reset": board.adc.reset_pin,
+            "adc_cs": PINS.index(board.adc.cs_pin),
             "spi_clock_hz": SPI_CLOCK_HZ,
             "cpu_mhz": round(board.cpu_mhz),
             "uid": "TWIN-" + board.name[:7].upper().ljust(7, "0"),  # twelve bytes, as on the chip

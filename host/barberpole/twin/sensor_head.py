@@ -83,6 +83,10 @@ class SensorHead:
                 self._known[(*self.magnetisation, *self.current_ma)] = known
         return known
 
+    def still_until(self, t_s: float) -> float:
+        """Time in s before which field and temperature stay as they were last seen."""
+        return self._until_s
+
     def die_field_ut(self) -> list[float]:
         """Field along the sensitive axis of each die in µT, coils included."""
         matrix, (ix, iy, iz) = self.coil_ut_per_ma, self.current_ma

@@ -4,6 +4,7 @@ Also charges the time that MicroPython's arithmetic takes on the real microcontr
 self-calibration point when its coil currents change, of a streamed row after the last sample of its RESET half.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -86,6 +87,21 @@ class Soldered:
     def ready_at(self, t_us: int) -> int:
         """When the converter's data-ready goes low, µs."""
         return self._adc.ready_at(t_us)
+
+    def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
+        """Frames that the converter will say next, as of Wiring; the one that ends a row is not among them."""
+        if not self._selected[PINS.index(self.board.adc.cs_pin)]:
+            return (), b""
+        if self._row_samples >= 0:
+            most = min(most, self.board.adc.samples_per_half - 1 - self._row_samples)
+        return self._adc.ahead(most)
+
+    def take(self, count: int) -> None:
+        """So many of them were read."""
+        for _ in range(count):
+            self._adc.take()
+            if self._row_samples >= 0:
+                self._count_sample()
 
     def take_charge_us(self) -> int:
         """Time that arithmetic has taken since the last call, µs."""

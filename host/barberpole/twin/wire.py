@@ -1,4 +1,8 @@
-"""The interpreter's requests, decoded and answered (the format stands in shims/_twin.py)."""
+"""The interpreter's requests, decoded and answered (the format stands in shims/_twin.py).
+
+A request costs two turns between the processes, so the answer to a read of the converter brings along what the next
+reads will find, as many as were used of the last such offer and one more.
+"""
 
 import contextlib
 import enum
@@ -10,7 +14,9 @@ from collections.abc import Callable
 from barberpole.twin.wiring import Wiring
 
 WORD = 8
+MOST_AHEAD = 15
 _HEAD = struct.Struct("<qq")
+_ANSWER = struct.Struct("<qqq")
 
 
 class Op(enum.IntEnum):
@@ -27,6 +33,7 @@ class Wire:
         self._on_op = on_op
         self.now_us = now_us
         self.interrupt = False
+        self._most_ahead, self._offered = 1, False
         from_board, to_here = os.pipe()
         from_here, to_board = os.pipe()
         self.far_ends = (to_here, from_here)
@@ -56,16 +63,18 @@ class Wire:
         data = self._rest(head, data_at + sent)[data_at:] if sent else bytes(wanted)
         if not allow(now_us):
             return True
+        if self._offered:
+            self._take(word >> 4 & 0xF)
         if changes:
             for change in memoryview(head)[2 * WORD : data_at].cast("q"):
                 self._soldered.pin(change >> 16, change >> 8 & 0xFF, change & 0xFF)
-        op = word & 0xFF
+        op = word & 0xF
         answer = b""
         if op == Op.SPI:
             answer = self._soldered.transfer(now_us, word >> 8 & 0xFF, data)[:wanted]
         elif op != Op.SYNC:
             self._on_op(Op(op))
-        self._reply(now_us, answer, may_interrupt=op != Op.FLASH)  # a file system is not left half way
+        self._reply(now_us, answer, op)
         return True
 
     def _rest(self, head: bytes, size: int) -> bytes:
@@ -83,11 +92,20 @@ class Wire:
         poll.register(self.fileno, select.POLLIN)
         return bool(poll.poll(0))
 
-    def _reply(self, now_us: int, answer: bytes, may_interrupt: bool) -> None:
+    def _take(self, count: int) -> None:
+        """The program has had so many of the frames that were offered."""
+        self._soldered.take(count)
+        self._most_ahead = min(max(count + 1, self._most_ahead - 1), MOST_AHEAD)
+        self._offered = False
+
+    def _reply(self, now_us: int, answer: bytes, op: int) -> None:
         self.now_us = now_us + self._soldered.take_charge_us()
         ready_us = self._soldered.ready_at(self.now_us)
         time_us = self.now_us
-        if self.interrupt and may_interrupt:
+        ahead_us, frames = self._soldered.ahead(self._most_ahead) if op == Op.SPI else ((), b"")
+        self._offered = bool(frames)
+        if self.interrupt and op != Op.FLASH:  # a file system is not left half way
             time_us, self.interrupt = ~self.now_us, False
+        answer = _ANSWER.pack(time_us, ready_us, max(len(ahead_us) - 2, 0)) + answer
         with contextlib.suppress(BrokenPipeError):  # killed meanwhile
-            os.write(self._reply_to, _HEAD.pack(time_us, ready_us) + answer)
+            os.write(self._reply_to, answer + struct.pack(f"<{len(ahead_us)}q", *ahead_us) + frames)

@@ -1,5 +1,6 @@
 """The two roles of an emulated board behind one face: a sensor board, or a coil driver."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from barberpole.board import Board
@@ -30,6 +31,17 @@ class Wiring(Protocol):
 
     def ready_at(self, t_us: int) -> int:
         """When the converter's data-ready goes low."""
+        ...
+
+    def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
+        """Up to `most` frames that the converter will say next if nothing but its chip select moves.
+
+        Their times of data-ready and two more of those in µs, and the frames; nothing where that cannot be told.
+        """
+        ...
+
+    def take(self, count: int) -> None:
+        """The program has read so many of the frames of the last `ahead`, each in its time."""
         ...
 
     def take_charge_us(self) -> int:

@@ -1,6 +1,6 @@
 # time.py: MicroPython's time module on the emulated board's clock.
 import _twin
-from _twin import PERIOD, TICKS_US, advance, ticks_us
+from _twin import PERIOD, TICKS_US, advance, ticks_ms, ticks_us
 from utime import gmtime as _gmtime
 from utime import localtime as _localtime
 from utime import mktime
@@ -9,13 +9,8 @@ _HALF = PERIOD // 2
 _START_S = 1420070400  # 1 January 2015, where this port's clock starts without a battery
 
 
-def ticks_ms():
-    advance(TICKS_US)
-    return _twin.now // 1000 & (PERIOD - 1)
-
-
 def ticks_cpu():
-    return _twin.now * _twin.setup["cpu_mhz"] & (PERIOD - 1)
+    return (_twin.now + _twin._offset_us) * _twin.setup["cpu_mhz"] & (PERIOD - 1)
 
 
 def ticks_add(ticks, delta):
