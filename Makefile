@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: trials coverage demo test lint bench docs pictures reproduce clean
+.PHONY: trials coverage demo test lint bench soak docs pictures reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo

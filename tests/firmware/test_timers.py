@@ -256,6 +256,27 @@ def test_what_the_timers_cannot_do_is_refused():
         Bench(100, RING_CYCLES=64)
 
 
+@pytest.mark.parametrize("pause_ms", [0, 9, 40])
+@pytest.mark.parametrize("before_us", [3, 700, 12_345])
+def test_ticks_that_wrap_cost_no_cycle(before_us, pause_ms):
+    """Ticks begin anew at 2^30 µs, in the middle of a cycle, of its reading, or of a pause of the program."""
+    bench = Bench(1000)
+    bench.mcu.wait(((1 << 30) - 10_000 - before_us) * UNITS_PER_US)
+    times, numbers = [], []
+    for number in range(60):
+        _, by_set, by_reset = bench.read()
+        assert by_set == by_reset
+        numbers.append(by_set)
+        times.append(bench.sampler.mid_us)
+        bench.mcu.wait((1000 * pause_ms if number == 8 else ROW_US) * UNITS_PER_US)
+    assert times[0] > times[-1]
+    skipped = np.diff(numbers) % 32 - 1
+    assert bench.sampler.lost == skipped.sum()
+    assert bool(skipped.sum()) == (pause_ms > 24)  # the ring's depth
+    passed_us = np.diff(times) % (1 << 30)
+    np.testing.assert_allclose(passed_us, 1000 * (skipped + 1), atol=2)
+
+
 CYCLES = 10_000
 ROW_US = 450  # what the program does with a cycle before it asks for the next
 

@@ -8,6 +8,12 @@ from pathlib import Path
 
 import pytest
 from barberpole.board import load_board
+from barberpole.calibrating import calibration_of, with_selfcal
+from barberpole.demo.bench import TRUE_EFFECTS, Bench
+from barberpole.fit.fit import fit_observations
+from barberpole.modelfile import ModelFile
+from barberpole.nominal import nominal
+from barberpole.observations import observations
 from barberpole.twin import Twin
 
 PROGRAMS = Path(__file__).with_name("programs")
@@ -16,6 +22,19 @@ PROGRAMS = Path(__file__).with_name("programs")
 @pytest.fixture(scope="session")
 def board():
     return load_board("pybv11")
+
+
+@pytest.fixture(scope="session")
+def calibrated(tmp_path_factory):
+    """A bench, and a calibration from a log of known fields on it, with the factory's coil run as reference."""
+    bench = Bench(load_board("pybv11"), tmp_path_factory.mktemp("bench"), seed=7, say=lambda _: None)
+    with bench.on(bench.station(150)) as twin:
+        bench.deploy(twin, nominal(bench.board), "factory")
+        session = bench.power_up(twin, "factory", 750)
+    model = ModelFile(("bias", "scale", *TRUE_EFFECTS))
+    fit = fit_observations(observations(session.log, bench.board.sensor), model)
+    made = calibration_of(fit, session.log, model)
+    return bench, with_selfcal(made, session.run.selfcal, bench.board.sensor)
 
 
 @pytest.fixture

@@ -5,16 +5,10 @@ import time
 
 import numpy as np
 import pytest
-from barberpole.board import load_board
-from barberpole.calibrating import calibration_of, with_selfcal
 from barberpole.demo.bench import TRUE_EFFECTS, Bench, scale_at_reference
-from barberpole.fit.fit import fit_observations
 from barberpole.link.deploy import pull
 from barberpole.link.record import record
 from barberpole.log import read_log
-from barberpole.modelfile import ModelFile
-from barberpole.nominal import nominal
-from barberpole.observations import observations
 from barberpole.reasons import reason
 from barberpole.records import RESULT, decode
 from barberpole.twin.world import World
@@ -38,20 +32,13 @@ REASON = {
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
-    return Bench(load_board("pybv11"), tmp_path_factory.mktemp("bench"), seed=7, say=lambda _: None)
+def bench(calibrated):
+    return calibrated[0]
 
 
 @pytest.fixture(scope="module")
-def calibration(bench):
-    """From a log of known fields, with the factory's coil run as reference."""
-    with bench.on(bench.station(150)) as twin:
-        bench.deploy(twin, nominal(bench.board), "factory")
-        session = bench.power_up(twin, "factory", 750)
-    model = ModelFile(("bias", "scale", *TRUE_EFFECTS))
-    fit = fit_observations(observations(session.log, bench.board.sensor), model)
-    made = calibration_of(fit, session.log, model)
-    return with_selfcal(made, session.run.selfcal, bench.board.sensor)
+def calibration(calibrated):
+    return calibrated[1]
 
 
 @pytest.fixture(scope="module")

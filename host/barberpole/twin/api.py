@@ -46,11 +46,13 @@ class Twin:
         files: Mapping[str, str | Path] | None = None,
         romfs_kib: int = 0,
         frozen: str | Path | None = None,
+        wrap_s: float = 0.0,
     ):
         """`seed` sets noise and magnetisation at power-up; `files` maps paths on the board to files to put there.
 
         romfs_kib: size of the ROMFS partition of the board's firmware; 0: none, as in stock firmware. frozen: a build
-        folder whose modules and main program stand in for those frozen into the firmware.
+        folder whose modules and main program stand in for those frozen into the firmware. wrap_s: board time in s at
+        which time.ticks_us and ticks_ms, which end at 2^30, begin at 0 again; 0: they begin with the power.
         Raises InputError for an unknown fault or pin, a missing interpreter or files that do not fit.
         """
         self.world: Any = default_world(board) if world is None else world
@@ -58,7 +60,7 @@ class Twin:
         self._board, self._seed, self._faults = board, check_seed(seed), check_faults(faults)
         self._image = (Path(flash_dir) / f"{board.name}.lfs2").resolve()
         self._files = files or {}
-        self._romfs_kib, self._frozen = romfs_kib, frozen
+        self._romfs_kib, self._frozen, self._wrap_s = romfs_kib, frozen, wrap_s
         self._process: subprocess.Popen | None = None
         self.port = ""
 
@@ -111,17 +113,15 @@ class Twin:
         seed: int | None = None,
         faults: Iterable[str] | None = None,
         cut_s: float = math.inf,
-        wrap_s: float = 0.0,
     ) -> None:
         """Off and on again: same flash, fresh chips, new magnetisation; what is given replaces what it was.
 
-        cut_s: board time in s at which the power goes away again, until the next call. wrap_s: board time at which
-        time.ticks_us and ticks_ms, which end at 2^30, begin at 0 again; 0: they begin with the power, as on a board.
+        cut_s: board time in s at which the power goes away again, until the next call.
         """
         self.world = self.world if world is None else world
         self._seed = self._seed if seed is None else check_seed(seed)
         self._faults = self._faults if faults is None else check_faults(faults)
-        self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s, wrap_s))
+        self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s, self._wrap_s))
 
     def kill(self) -> None:
         """Pull the plug now; the board stays off until `power_cycle`."""
@@ -163,7 +163,15 @@ class Twin:
     @property
     def log_text(self) -> str:
         """All that the board has said since it was made (the last eight megabytes)."""
-        return self._ask("log")
+        return self.said_since(0)
+
+    def said(self) -> int:
+        """How many bytes the board has said since it was made."""
+        return self._ask("said")
+
+    def said_since(self, said: int) -> str:
+        """What the board has said after its first `said` bytes."""
+        return self._ask("log", said)
 
     def _ask(self, command: str, argument: object = None):
         if self._process is None:

@@ -51,7 +51,7 @@ class BoardProcess:
         self._running: Running | None = None
         self._now_us = self._start_us = 0
         self._cut = False
-        self._log = bytearray()
+        self._said, self._log = 0, bytearray()
 
     def run(self) -> None:
         """Be a board until the control connection closes."""
@@ -108,6 +108,7 @@ class BoardProcess:
             self._port.drop()
 
     def _say(self, data: bytes) -> None:
+        self._said += len(data)
         self._log += data
         del self._log[:-LOG_BYTES]
         self._port.send(data)
@@ -189,8 +190,11 @@ class BoardProcess:
                 return 1e-6 * self._start_us
             case "truth":
                 return self._soldered.truth(self._time_us()) if self._soldered else {}
+            case "said":
+                return self._said
             case "log":
-                return self._log.decode("utf-8", "replace")
+                gone = self._said - len(self._log)
+                return self._log[max(argument - gone, 0) :].decode("utf-8", "replace")
             case "pid":
                 return self._running.pid if self._running else 0
         raise EOFError
