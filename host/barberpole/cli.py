@@ -42,23 +42,20 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-calibrate.register(app)
-catalogue.register(app)
-methods.register(app)
-characterise.register(app)
-board.register(app)
-board_check.register(app)
-imcs.register(app)
-array.register(app)
-live.register(app)
-trajectory.register(app)
-design.register(app)
-challenge.register(app)
-report.register(app)
-demo.register(app)
-doctor.register(app)
-fleet.register(app)
-workbench.register(app)
+PANELS = {
+    "A log and its model": (calibrate, catalogue, methods, challenge),
+    "See it": (report, workbench),
+    "A board": (demo, board, board_check, live, trajectory, imcs, array),
+    "A kind of sensor, and the apparatus": (characterise, design),
+    "Many boards": (fleet,),
+    "This machine": (doctor,),
+}
+for panel, modules in PANELS.items():
+    commands, groups = len(app.registered_commands), len(app.registered_groups)
+    for module in modules:
+        module.register(app)
+    for added in (*app.registered_commands[commands:], *app.registered_groups[groups:]):
+        added.rich_help_panel = panel
 
 
 @app.callback(invoke_without_command=True)

@@ -1,7 +1,7 @@
 """characterise: the data sheet of one sensor from its logs; simulate: logs of a sensor that a file describes."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -9,7 +9,6 @@ import typer
 from barberpole import __version__
 from barberpole.board import load_sensor
 from barberpole.challenge.motion import smooth
-from barberpole.characterise.sheet import Sheet, make_sheet
 from barberpole.characterise.simulate import readings
 from barberpole.columns import FIELD, READINGS
 from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
@@ -18,6 +17,9 @@ from barberpole.log import Log, read_log, write_log
 from barberpole.numbers import uncertain
 from barberpole.sensor import Sensor
 from barberpole.trajectory.programs import FREQUENCIES_HZ, SINE_PEAK_TO_PEAK_UT, lin_60000
+
+if TYPE_CHECKING:
+    from barberpole.characterise.sheet import Sheet
 
 PROGRAMS = ("linearity", "rest", "sine", "turned")
 REPEATS = 25  # readings of each field of the linearity program
@@ -38,6 +40,8 @@ def characterise(
     as_json: bool = AS_JSON,
 ) -> None:
     """One sensor's data sheet, in the form of the article's table 1, with uncertainties."""
+    from barberpole.characterise.sheet import make_sheet  # here: scipy.signal is slow to load
+
     read = [read_log(path) for path in logs]
     sheet = make_sheet(read)
     if output:
@@ -57,7 +61,7 @@ def characterise(
         OUT.print(f"page written to {output}")
 
 
-def _json(sheet: Sheet) -> dict:
+def _json(sheet: "Sheet") -> dict:
     """The figures as objects; an error that is not known is null."""
     rows = [
         {

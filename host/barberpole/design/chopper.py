@@ -14,7 +14,6 @@ so 1/f becomes white, and lower the faster one flips.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 from scipy.special import zeta
 
 Array = np.ndarray
@@ -54,6 +53,8 @@ class Stages:
 
 def simulate(chain: Chain, seconds: float, cutoff_hz: float, seed: int = 0) -> Stages:
     """The chain over a time in s, with a low pass at `cutoff_hz` at its end."""
+    from scipy import signal  # here: it is slow to load, and the choice of a rate does not need it
+
     count = round(seconds * chain.flip_hz) * chain.samples_per_cycle
     time_s = np.arange(count) / chain.sample_hz
     field = chain.signal_nt * np.sin(2 * np.pi * chain.signal_hz * time_s)
@@ -77,6 +78,8 @@ def flicker(count: int, chain: Chain, rng: np.random.Generator) -> Array:
 
 def density(values_nt: Array, sample_hz: float, resolution_hz: float) -> tuple[Array, Array]:
     """Frequencies in Hz and density in nT/sqrt(Hz) of a stage, by Welch's method."""
+    from scipy import signal
+
     length = min(len(values_nt), round(sample_hz / resolution_hz))
     frequency_hz, power = signal.welch(values_nt, sample_hz, nperseg=length)
     return frequency_hz, np.sqrt(power)
