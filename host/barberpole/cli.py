@@ -97,6 +97,10 @@ def run(arguments: list[str]) -> int:
         return _refuse(must("a file or folder", "one that can be used", error.strerror or error, error.filename or ""))
     except LinAlgError as error:
         return _refuse(must("the log", "one that determines what is asked", f"readings without a solution: {error}"))
+    except RecursionError:
+        return _refuse(must("what was read", "a file of this kind", "parts within parts, too deep to read"))
+    except MemoryError:
+        return _refuse(must("what was read", "such as fits into the memory of this machine", "more than that"))
     return code if isinstance(code, int) else 0
 
 

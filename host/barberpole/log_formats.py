@@ -16,6 +16,7 @@ from barberpole.errors import InputError, must
 Columns = dict[str, np.ndarray]
 
 NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "None"]
+MOST_NUMBERS = 500_000_000  # 4 GB; a small Parquet file may claim any number of equal rows
 THREADS_FROM = 1 << 20  # bytes; below, starting threads takes longer than reading
 _META = b"barberpole"
 
@@ -44,6 +45,10 @@ def read_csv(data: bytes, where: object, readings: bool = True) -> tuple[Columns
 def read_parquet(data: bytes, where: object, readings: bool = True) -> tuple[Columns, list[str], dict[str, Any]]:
     """Columns of a Parquet file, notes, and the metadata that `write_parquet` put there."""
     try:
+        claimed = pa_parquet.read_metadata(pa.BufferReader(data))
+        if claimed.num_rows * claimed.num_columns > MOST_NUMBERS:
+            got = f"{claimed.num_rows} rows of {claimed.num_columns} columns"
+            raise InputError(must("the log", f"of at most {MOST_NUMBERS:g} numbers to be read whole", got, where))
         table = pa_parquet.read_table(pa.BufferReader(data), use_threads=len(data) > THREADS_FROM)
         meta = meta_of(table.schema)
     except (ValueError, OSError) as error:

@@ -151,6 +151,6 @@ def _typed(kind: str, sequence: int, payload: bytes) -> Frame | None:
         return Frame(kind, sequence, payload)
     try:
         content = json.loads(payload)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return Frame(kind, sequence, payload, content) if isinstance(content, dict) else None

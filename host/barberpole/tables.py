@@ -36,6 +36,8 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         return tomllib.loads(read_text(path, what))
     except tomllib.TOMLDecodeError as error:
         raise InputError(must(what, "valid TOML", error, path)) from None
+    except RecursionError:
+        raise InputError(must(what, "valid TOML", "brackets within brackets, too deep to read", path)) from None
 
 
 T = typing.TypeVar("T")

@@ -22,6 +22,7 @@ LOG, REST, MODEL, SEALED = "log.csv", "rest.csv", "model.toml", "answer.sealed"
 NOTHING = "none"
 UNKNOWN = "unknown"  # the answer where no effect of the catalogue is right
 PLAYED = tuple(name for name in CATALOGUE if name not in ("misalignment", "soft_iron"))  # the model has the angles
+LARGEST_ANSWER = 1 << 20  # bytes
 
 
 @dataclass(frozen=True)
@@ -114,8 +115,13 @@ def _seal(content: dict) -> bytes:
     return base64.b64encode(zlib.compress(json.dumps(content).encode())) + b"\n"
 
 
+def _unpacked(sealed: bytes) -> bytes:
+    """What is packed in an answer, of the size that one may have: a few bytes may claim to hold gigabytes."""
+    return zlib.decompressobj().decompress(sealed, LARGEST_ANSWER)
+
+
 def _unseal(path: Path) -> dict:
     try:
-        return json.loads(zlib.decompress(base64.b64decode(read_text(path, "the sealed answer"))))
+        return json.loads(_unpacked(base64.b64decode(read_text(path, "the sealed answer"))))
     except (ValueError, zlib.error):
         raise InputError(must("the sealed answer", "as `challenge new` wrote it", "another content", path)) from None
