@@ -1,9 +1,14 @@
 """Files are replaced whole: a reader sees the old one or the new one, never half of one."""
 
+import contextlib
+import errno
 import os
+import secrets
 from pathlib import Path
 
 from barberpole.errors import InputError, must
+
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def write_atomic(path: str | Path, content: bytes | str) -> None:
@@ -13,13 +18,22 @@ def write_atomic(path: str | Path, content: bytes | str) -> None:
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    beside = path.with_name(f"{path.name}.tmp-{os.getpid()}")
+    beside = path.with_name(f"{path.name}.tmp-{os.getpid()}-{secrets.token_hex(4)}")  # threads write too
     try:
         beside.write_bytes(data)
         beside.replace(path)
     except OSError as error:
+        _remove(beside)
+        wanted = "on a disk with room" if error.errno in FULL else "in a folder that can be written"
+        raise InputError(must("the output file", wanted, error.strerror, path)) from None
+    except BaseException:  # Ctrl-C among them
+        _remove(beside)
+        raise
+
+
+def _remove(beside: Path) -> None:
+    with contextlib.suppress(OSError):  # a parent that is a file, a disk that went away: there is nothing to remove
         beside.unlink(missing_ok=True)
-        raise InputError(must("the output file", "in a folder that can be written", error.strerror, path)) from None
 
 
 def read_bytes(path: str | Path, what: str) -> bytes:

@@ -3,8 +3,9 @@
 What is wrong with a plugin becomes one InputError that names the file, the line and what was expected.
 """
 
+import hashlib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +15,11 @@ from barberpole import plugin_trial
 from barberpole.effects import ALIASES, STACK, Effect
 from barberpole.errors import InputError, must
 from barberpole.files import read_text, write_atomic
+
+SAID: list[Callable[[Path], None]] = []
+"""Whoever runs a session may say here which files of a user's code it is about to run, each the first time."""
+
+_ran: set[tuple[Path, str]] = set()
 
 TEMPLATE = Path(__file__).with_name("plugin_template.py")
 
@@ -66,6 +72,7 @@ def _execute(path: Path) -> ModuleType:
     module = ModuleType(path.stem)
     module.__file__ = str(path)
     text = read_text(path, "a plugin")
+    _say(path, text)
     try:
         exec(compile(text, str(path), "exec"), module.__dict__)
     except SyntaxError as error:
@@ -75,6 +82,15 @@ def _execute(path: Path) -> ModuleType:
         where = plugin_trial.line_of(path, error)
         raise InputError(must("a plugin", "a file that runs", plugin_trial.said(error), where)) from error
     return module
+
+
+def _say(path: Path, text: str) -> None:
+    """Tell the session before code runs that it has not run yet."""
+    this = (path.resolve(), hashlib.sha256(text.encode()).hexdigest())
+    if this not in _ran:
+        _ran.add(this)
+        for say in SAID:
+            say(path)
 
 
 def _as_written(name: str, module: ModuleType) -> Effect:
