@@ -102,7 +102,7 @@ def test_a_host_that_joins_later_reads_the_stream(board, calibration, tmp_path):
     record(board.port, tmp_path / "late.bpr", frames=600)
     log = read_log(tmp_path / "late.bpr")
     assert log.n > 590
-    assert log.skipped <= 1  # the line in which it joined
+    assert log.skipped <= 2  # the line in which it joined, and one that the reader before it left half read
     assert log.meta["calibration"] == calibration.hash
     assert log.meta["result"]["in_force_gain"] == result["in_force_gain"]
     assert verify(log, calibration).to_json()["running"] == calibration.hash

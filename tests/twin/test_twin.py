@@ -1,6 +1,7 @@
 """Programs on the emulated board: time, determinism, power."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -19,9 +20,9 @@ END = "end of readings"
 
 
 def readings(log):
-    """(rows, 8) averages that programs/readings.py printed last."""
+    """(rows, 8) averages that programs/readings.py printed last, whatever prompt stands before them."""
     lines = log[: log.rindex(END)].splitlines()[-6:]
-    return np.array([[float(value) for value in line.removeprefix(">>> ").split()] for line in lines])
+    return np.array([[float(value) for value in re.findall(r"-?\d+\.\d{3}", line)] for line in lines])
 
 
 def alive(pid):
