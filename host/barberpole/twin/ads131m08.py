@@ -113,24 +113,30 @@ class Ads131m08:
         Nothing is changed by asking: a frame counts when `take` says so. None but after a read that was no command.
         """
         quiet = self._silent or self._standby or self._low_since is not None
-        if quiet or len(self._in) != FRAME_BYTES or any(self._in):
+        if most <= 0 or quiet or len(self._in) != FRAME_BYTES or any(self._in):
             return [], b""
         self._coming = list(self._fifo)[:most]
-        ends_us = [self._end_us(self._next + i) for i in range(max(most - len(self._coming), 0) + 2)]
-        codes = self._convert_ahead(ends_us[:-2])
-        if not self._coming and not len(codes):
+        start_us, period_us, first = self._start_us, self._period_us, self._next
+        count = most - len(self._coming)
+        ends_us = [start_us + number * period_us for number in range(first, first + count + 2)]
+        codes = self._convert_ahead(ends_us[:count])
+        if self._coming:
+            codes = np.concatenate([np.array([c for _, c in self._coming]), codes])
+            ends_us = [end_us for end_us, _ in self._coming] + ends_us
+        if not len(codes):
             return [], b""
-        ends_us = [end_us for end_us, _ in self._coming] + ends_us[: len(codes) + 2]
-        waiting = np.array([c for _, c in self._coming], np.int64).reshape(-1, CHANNELS)
-        self._coming += zip(ends_us[len(waiting) :], codes.tolist(), strict=False)
-        return [math.ceil(end_us) for end_us in ends_us], framed(self._status(0xFF), np.concatenate([waiting, codes]))
+        self._coming = list(zip(ends_us, codes.tolist(), strict=False))
+        return [math.ceil(end_us) for end_us in ends_us[: len(codes) + 2]], framed(self._status(0xFF), codes)
 
     def _convert_ahead(self, ends_us: list[float]) -> np.ndarray:
         """Codes (n, CHANNELS) of the conversions that end at these times, up to the first that cannot be told yet."""
         volts = self._inputs.ahead(ends_us, self._period_us)
         if self._stuck and self._stuck_codes is not None:
             return np.array([self._stuck_codes] * len(volts), np.int64).reshape(-1, CHANNELS)
-        return np.clip(np.rint(volts * self._codes_per_v), -FULL_SCALE, FULL_SCALE - 1).astype(np.int64)
+        codes = np.rint(volts * self._scale)
+        np.maximum(codes, -FULL_SCALE, out=codes)
+        np.minimum(codes, FULL_SCALE - 1, out=codes)
+        return codes.astype(np.int64)
 
     def take(self) -> None:
         """The first of the frames ahead has been read."""
@@ -195,6 +201,7 @@ class Ads131m08:
         scale = FULL_SCALE / self._vref_v
         enabled = self._registers[CLOCK] >> 8
         self._codes_per_v = [scale * (1 << (gains >> 4 * i & 7)) * (enabled >> i & 1) for i in range(CHANNELS)]
+        self._scale = np.array(self._codes_per_v)
 
     def _restart(self, t_us: float) -> None:
         self._start_us = t_us

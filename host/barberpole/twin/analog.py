@@ -53,15 +53,18 @@ class AnalogInputs:
 
     def ahead(self, ends_us: Sequence[float], period_us: float) -> np.ndarray:
         """Volts (n, INPUTS) of the conversions that end then, up to the first that cannot be told before its time."""
-        times_s = [self._middle_s(end_us, period_us) for end_us in ends_us]
-        count = next((i for i, t_s in enumerate(times_s) if not t_s < self.head.still_until(t_s)), len(times_s))
+        count = len(ends_us)
+        while count and not (t_s := self._middle_s(ends_us[count - 1], period_us)) < self.head.still_until(t_s):
+            count -= 1
         if not count:
             return np.empty((0, INPUTS))
-        volts = np.array([self.head.volts(times_s[0])] * count)
+        volts = np.array(self.head.volts(self._middle_s(ends_us[0], period_us)))
+        noise = self._noise.rows(int(ends_us[0] // period_us), count)  # the periods are binary fractions: no gap
         for at_us, delta in self._steps:
-            shares = [1.0 - sinc3_step((end_us - at_us) / period_us) for end_us in ends_us[:count]]
-            volts -= np.outer(shares, delta)
-        return volts + [self._noise.at(int(end_us // period_us)) for end_us in ends_us[:count]]
+            if ends_us[0] - at_us < FILTER_PERIODS * period_us:
+                missing = [[1.0 - sinc3_step((end_us - at_us) / period_us)] for end_us in ends_us[:count]]
+                volts = volts - np.array(missing) * delta
+        return volts + noise
 
     def converted(self, end_us: float, period_us: float) -> list[float]:
         """Volts of the conversion that ends at end_us, one per input."""

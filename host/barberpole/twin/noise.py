@@ -34,6 +34,7 @@ class Noise:
         self._key = (seed, power_up)
         self._first = -1
         self._rows: list[list[float]] = []
+        self._block = np.empty((0, 0))  # the same
         self._former: tuple[int, list[list[float]]] = (-1, [])  # 1/f noise cannot be drawn backwards
         self._has_flicker = any(level.flicker_v2)
         self._taus_s = FASTEST_S * RATIO ** np.arange(1 + math.log(SLOWEST_S / FASTEST_S, RATIO))
@@ -53,13 +54,20 @@ class Noise:
             row = index - self._first
         return self._rows[row]
 
+    def rows(self, index: int, count: int) -> np.ndarray:
+        """Volts (count, inputs) at conversion `index` and those after it."""
+        at = index - self._first
+        if self._first >= 0 and 0 <= at <= BLOCK - count:
+            return self._block[at : at + count]
+        return np.array([self.at(index + i) for i in range(count)])
+
     def _draw(self, block: int) -> None:
         random = np.random.default_rng((*self._key, block))
         volts = random.standard_normal((BLOCK, len(self._level.white_v))) * self._level.white_v
         if self._has_flicker:
             volts += self._flicker(random, block * BLOCK)
         self._first = block * BLOCK
-        self._rows = volts.tolist()
+        self._block, self._rows = volts, volts.tolist()
 
     def _flicker(self, random: np.random.Generator, first: int) -> np.ndarray:
         """The next block (BLOCK, inputs) in V of the sum of low-pass noises."""
