@@ -51,15 +51,15 @@ def board(bench, calibration):
 
 def power_up(twin, **how):
     """The verdict of one power-up, out of what the board says."""
-    said = len(twin.log_text)
+    said = twin.said()
     twin.power_cycle(**({"faults": ()} | how))
     until = time.monotonic() + PATIENCE_S
     while time.monotonic() < until:
-        results = [f.json for f in decode(twin.log_text[said:].encode()).frames if f.type == RESULT]
+        results = [f.json for f in decode(twin.said_since(said).encode()).frames if f.type == RESULT]
         if results:
             return results[-1]
         time.sleep(0.02)
-    raise AssertionError(f"no verdict: {twin.log_text[said:][-2000:]}")
+    raise AssertionError(f"no verdict: {twin.said_since(said)[-2000:]}")
 
 
 def truth_ppm(twin, calibration, result):

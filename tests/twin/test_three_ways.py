@@ -53,18 +53,18 @@ def started(tmp_path):
 
 def power_up(twin):
     """Header and verdict of one power-up, None for both where the board fell through to its prompt."""
-    said = len(twin.log_text)
+    said = twin.said()
     twin.power_cycle(seed=3)
     until = time.monotonic() + PATIENCE_S
     while time.monotonic() < until:
-        frames = decode(twin.log_text[said:].encode()).frames
+        frames = decode(twin.said_since(said).encode()).frames
         if any(frame.type == RESULT for frame in frames):
             head, result = (next(f.json for f in frames if f.type == kind) for kind in (HEADER, RESULT))
             return head, result
-        if ">>> " in twin.log_text[said:]:
+        if ">>> " in twin.said_since(said):
             return None, None
         time.sleep(0.02)
-    raise AssertionError(twin.log_text[said:][-2000:])
+    raise AssertionError(twin.said_since(said)[-2000:])
 
 
 def test_all_three_ways_run_the_same_firmware(built, started):
