@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: trials coverage fuzz demo test lint bench soak docs pictures reproduce clean
+.PHONY: trials coverage fuzz release-check demo test lint bench soak docs pictures reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo
@@ -38,6 +38,10 @@ coverage: $(STAMP)
 # Ten thousand damaged files of every kind through the command line: no traceback, no hang, no lost memory.
 fuzz: $(STAMP)
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m fuzzing.run --cases 10000
+
+# The wheel in an empty environment, without the repository: version, fit, demo; the source archive. Some minutes.
+release-check: $(STAMP)
+	@$(BIN)/python -m pytest -m release tests/host/test_release.py
 
 docs: $(STAMP)
 	@$(BIN)/python -m barberpole.docs host/docs
