@@ -136,7 +136,7 @@ class _Fit:  # equation (1) over the first points, read at this gain and offset
         return max([max([m[i] for m in means]) - min([m[i] for m in means]) for i in range(3)]) if means else 0.0
 
 
-def _in_numbers(solution):  # nan and inf, where float32 ran over, are below no bound: judge() would let nan pass
+def in_numbers(solution):  # nan and inf, where float32 ran over, are below no bound: judge() would let nan pass
     found = solution.gain + solution.ambient_ut + solution.residual_ut + solution.offset_lsb
     if not sum([abs(value) for value in found]) < _HUGE:
         raise ValueError
@@ -201,7 +201,7 @@ def run(sampler, coils, compensator, trajectory, calibration, board):
     begin_ms = time.ticks_ms()
     try:
         measure(result.points, sampler, coils, compensator, trajectory, board)
-        result.solution = _in_numbers(solve(result.points, calibration, trajectory, calibration.GAIN_DRIFT_LIMIT))
+        result.solution = in_numbers(solve(result.points, calibration, trajectory, calibration.GAIN_DRIFT_LIMIT))
         result.current_ratio = current_ratio(result.points, trajectory)
         result.offset_lsb = offset_lsb(result.points)
         result.reasons = judge(result.solution, result.current_ratio, calibration, board)

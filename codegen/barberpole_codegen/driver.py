@@ -4,41 +4,29 @@ The folder has the form of a sensor board's build, so that `flash` takes both.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from barberpole import mpy, paths
-from barberpole.built import LISTING, MAIN, romfs_image, sha256
+from barberpole import paths
+from barberpole.built import MAIN
 from barberpole.driver_board import Driver
 from barberpole.trajectory import CodeTable, Trajectory, driver_table, for_driver
 
-from barberpole_codegen import budget, image, parts, settings, ways
+from barberpole_codegen import budget, parts, settings
 from barberpole_codegen.emit import Constant, module
-from barberpole_codegen.folder import as_json, require_replaceable, write_folder
+from barberpole_codegen.folder import require_replaceable
 from barberpole_codegen.modules import VERSION, trajectory_text
+from barberpole_codegen.roles import Compiled, Head, RoleBuild, room, write_role
 
-FORMAT = 2
 Progress = Callable[[str], None]
 SHARED = (MAIN, "bp_ads131m08.py", "bp_coils.py", "bp_dac80504.py", "bp_native.py", "bp_reasons.py", "bp_records.py")
 GENERATED = ("bp_board", "bp_trajectory")
 
 
-@dataclass(frozen=True)
-class DriverBuild:
-    """What was built. `files`: path in the folder -> path on the board, relative to its working folder."""
-
-    folder: Path
-    build: str
-    board: str
-    trajectory: str
-    files: dict[str, str]
-    budget: dict[str, Any]
-
-
 def build_driver(
     driver: Driver, out_dir: str | Path, trajectory: Trajectory | None = None, progress: Progress | None = None
-) -> DriverBuild:
+) -> RoleBuild:
     """Build for a coil driver into `out_dir`, which is new, empty, or a former build; trajectory: another than its own.
 
     Raises InputError or LimitError; then nothing changed.
@@ -46,23 +34,8 @@ def build_driver(
     say, out_dir = progress or (lambda _: None), Path(out_dir)
     require_replaceable(out_dir)
     table = driver_table(trajectory or for_driver(driver), driver)
-    sources = _sources(driver, table)
-    build_hash = ways.build_hash(sources)
-    sources[f"{ways.MARK}.py"] = ways.mark(sources, "", VERSION)
-    say(f"compiling {len(sources) - 1} modules")
-    names = sorted(name for name in sources if name != MAIN)
-    compiled = {name.replace(".py", ".mpy"): mpy.compile_module(name, sources[name]) for name in names}
-    rom = romfs_image(compiled)
-    costs = _costs(driver, sources, compiled, rom)
-    files = {f"mpy/{name}": f"lib/{name}" for name in compiled} | {f"src/{MAIN}": MAIN}
-    content = {f"src/{name}": text.encode() for name, text in sources.items()}
-    content |= {f"mpy/{name}": data for name, data in compiled.items()}
-    content |= {"romfs.img": rom, "manifest.py": image.manifest(list(sources)).encode(), "budget.json": as_json(costs)}
-    made = DriverBuild(out_dir, build_hash, driver.name, table.id, files, costs)
-    content[LISTING] = as_json(_describe(made, content))
-    write_folder(out_dir, content)
-    say(f"built {out_dir}")
-    return made
+    head = Head(driver.role, driver.name, "", "", table.id)
+    return write_role(out_dir, head, _sources(driver, table), partial(_costs, driver), say)
 
 
 def _sources(driver: Driver, table: CodeTable) -> dict[str, str]:
@@ -73,35 +46,9 @@ def _sources(driver: Driver, table: CodeTable) -> dict[str, str]:
     return texts | {"bp_board.py": board_text(driver), "bp_trajectory.py": trajectory_text(driver, table)}
 
 
-def _costs(driver: Driver, sources: dict[str, str], compiled: dict[str, bytes], rom: bytes) -> dict[str, Any]:
+def _costs(driver: Driver, made: Compiled) -> dict[str, Any]:
     """budget.json. Raises LimitError where the files exceed the board's file system."""
-    flash = budget.flash_bytes({**compiled, MAIN: sources[MAIN].encode()})
-    sizes = {name: size for name, size in flash.items() if name != "total"}
-    return {
-        "ways": ways.figures(driver, sizes, len(rom), None),
-        "flash_bytes": flash,
-        "romfs_bytes": len(rom),
-        "ram_on_import_bytes": budget.ram_on_import(rom, [*GENERATED]),
-    }
-
-
-def _describe(made: DriverBuild, content: dict[str, bytes]) -> dict[str, Any]:
-    def entry(source: str, **more: str) -> dict[str, Any]:
-        return {"source": source, **more, "bytes": len(content[source]), "sha256": sha256(content[source])}
-
-    return {
-        "format": FORMAT,
-        "generator": f"barberpole_codegen {VERSION}",
-        "build": made.build,
-        "board": made.board,
-        "role": "coil_driver",
-        "model": "",
-        "calibration": "",
-        "trajectory": made.trajectory,
-        "files": [entry(source, target=target) for source, target in sorted(made.files.items())],
-        "romfs": entry("romfs.img"),
-        "firmware": {},
-    }
+    return room(driver, made) | {"ram_on_import_bytes": budget.ram_on_import(made.rom, [*GENERATED])}
 
 
 def board_text(driver: Driver) -> str:

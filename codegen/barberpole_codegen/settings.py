@@ -30,7 +30,7 @@ T0_C = 25.0  # at which the sensor file gives the bridge resistance
 
 def board_constants(board: Board) -> list[Constant]:
     """What is soldered, in the firmware's units; the last constant is the hash of all others."""
-    constants = [*_names(board), *_flip(board), *_adc(board), *_dac(board), *_selfcal(board)]
+    constants = [*_names(board), *_flip(board), *_adc(board), *_dac(board), *_selfcal(board), *_members(board)]
     return [*constants, Constant("HASH", digest(constants), "of all of the above")]
 
 
@@ -133,6 +133,15 @@ def _names(board: Board) -> list[Constant]:
         Constant("WATCHDOG_S", round(board.watchdog_s), "0: none"),
         Constant("SHIELDED", bool(board.shielded), "powers up in a shield: the ambient field is known to be zero"),
     ]
+
+
+def _members(board: Board) -> list[Constant]:
+    """Nothing on a board with one sensor."""
+    if not board.members:
+        return []
+    names = tuple(member.name for member in board.members)
+    pins = (board.adc.cs_pin, *(member.cs_pin for member in board.members[1:]))
+    return [Constant("SENSORS", names), Constant("CS_PINS", pins, "of a converter each")]
 
 
 def _flip(board: Board) -> list[Constant]:

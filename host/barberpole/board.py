@@ -9,7 +9,7 @@ from typing import Any
 
 from barberpole import paths
 from barberpole.board_checks import check_board
-from barberpole.board_tables import Board
+from barberpole.board_tables import Board, Member
 from barberpole.errors import InputError, must
 from barberpole.sensor import Sensor
 from barberpole.tables import closest, read_toml, unknown, validate
@@ -29,7 +29,11 @@ def load_board(name_or_path: str | Path) -> Board:
 def read_board(name_or_path: str | Path) -> Board:
     """A board that is well-formed, whatever it asks of its parts. Raises InputError."""
     path = find_file(name_or_path, paths.boards(), "board")
-    tables = read_toml(path, "the board file")
+    return board_of(read_toml(path, "the board file"), path)
+
+
+def board_of(tables: dict[str, Any], path: Path, members: tuple[Member, ...] = ()) -> Board:
+    """The board of a file's tables; members: the sensors of an array. Raises InputError."""
     head = tables.pop("board", None)
     if not isinstance(head, dict):
         raise InputError(must("the board file", "one with a table [board]", "none", path))
@@ -39,7 +43,7 @@ def read_board(name_or_path: str | Path) -> Board:
     sensor = head.get("sensor")
     if not isinstance(sensor, str):
         raise InputError(must("board.sensor", "the name of a sensor file", repr(sensor), path))
-    content = {**head, **tables, "sensor": load_sensor(_beside(path, sensor))}
+    content = {**head, **tables, "sensor": load_sensor(_beside(path, sensor)), "members": members}
     return validate(Board, content, "the board file", path, "board.")
 
 

@@ -27,6 +27,11 @@ SCAN_INPUTS, SCAN_CLOCKS, ADC_DIVIDER = 8, 40, 4
 """A scan of the on-chip converter: inputs, clocks of one (28 sampling, 12 converting); its clock is PCLK2 / 4."""
 
 
+FRAME_BITS, FRAME_PROGRAM_US = 240, 40.0
+"""A frame of the ADS131M08 (status, eight channels, check sum of 24 bits), and bytecode around it, estimated."""
+_COUNT = {3: "three", 6: "six"}
+
+
 def check_board(board: Board, where: object = "") -> None:
     """All checks, in the order of the file."""
     for check in CHECKS:
@@ -124,8 +129,9 @@ def _pulse(board: Board, where: object) -> None:
 def _strap_current(board: Board, where: object) -> None:
     peak, needed = strap_peak_a(board), board.sensor.strap_current_a
     flip = board.flip
+    count = _COUNT.get(3 * board.in_series, 3 * board.in_series)
     straps = (
-        f"three straps of {board.sensor.strap_ohm:g} Ω in series need it; {strap_decay(board):.0%} of a pulse's "
+        f"{count} straps of {board.sensor.strap_ohm:g} Ω in series need it; {strap_decay(board):.0%} of a pulse's "
         f"current is left after {flip.pulse_us:g} µs through {flip.capacitor_nf:g} nF and {strap_ohm(board):.3g} Ω"
     )
     _at_least(f"the pulse of {flip.strap_supply_v:g} V", peak, needed, "A", straps, where)
@@ -133,7 +139,7 @@ def _strap_current(board: Board, where: object) -> None:
 
 def _strap_power(board: Board, where: object) -> None:
     """Flipping must not heat the sensor more than its own supply does (thesis 3.4.3)."""
-    bridges_mw = 3.0 * board.sensor.bridge_v * board.sensor.bridge_ma
+    bridges_mw = 3.0 * board.in_series * board.sensor.bridge_v * board.sensor.bridge_ma
     reason = "C V² f of flip.capacitor_nf, strap_supply_v and rate_hz; no more than the bridges themselves take"
     _at_most("the power of flipping", strap_power_mw(board), bridges_mw, "mW", reason, where)
 
@@ -167,10 +173,12 @@ def _divided_voltages(board: Board, where: object) -> None:
 def _dac_range(board: Board, where: object) -> None:
     """Full scale is half the DAC's span over coil, shunt and series resistor."""
     half_mv = 500.0 * board.dac.vref_v * board.dac.gain
-    ohm = board.sensor.offset_coil_ohm + board.adc.coil_shunt_ohm + board.coils.series_ohm
+    coils_ohm = board.in_series * board.sensor.offset_coil_ohm
+    ohm = coils_ohm + board.adc.coil_shunt_ohm + board.coils.series_ohm
     for axis, full in zip(board.sensor.axes, board.coils.full_scale_ma, strict=True):
         if abs(full - half_mv / ohm) > FULL_SCALE_TOLERANCE * full:
-            ohms = f"{ohm:g} Ω of coil, shunt and series resistor"
+            coil = f"{board.in_series} coils in series" if board.in_series > 1 else "coil"
+            ohms = f"{ohm:g} Ω of {coil}, shunt and series resistor"
             be = f"{half_mv / ohm:.3g} mA, the DAC's ±{half_mv / 1000:g} V over {ohms}"
             raise LimitError(must(f"coils.full_scale_ma of {axis}", be, f"{full:g} mA", where))
 
@@ -203,6 +211,23 @@ def _coil_settling(board: Board, where: object) -> None:
         _at_most("coils.settle_us", board.coils.settle_us, settled_us, "µs", reason, where)
 
 
+def _converters(board: Board, where: object) -> None:
+    """An array has a converter for each sensor; all are read within one conversion."""
+    if not board.members:
+        return
+    if board.adc.part != "ads131m08":
+        raise InputError(must("adc.part", "ads131m08, whose chips keep step, on an array", board.adc.part, where))
+    first, *others = board.members
+    if first.cs_pin:
+        raise InputError(must("cs_pin of the first sensor", "left to adc.cs_pin", repr(first.cs_pin), where))
+    for member in others:
+        if not member.cs_pin:
+            raise InputError(must(f"cs_pin of the sensor {member.name}", "given", "nothing", where))
+    needed_us = board.in_series * (FRAME_BITS * 1e6 / board.adc.baud + FRAME_PROGRAM_US)
+    reason = f"a conversion of adc.sample_hz, in which {board.in_series} converters are read at adc.baud"
+    _at_most("the frames' time", needed_us, 1e6 / board.adc.sample_hz, "µs", reason, where)
+
+
 def _at_most(what: str, value: float, limit: float, unit: str, reason: str, where: object) -> None:
     if value > limit * (1 + 1e-9):  # rounding is no fault
         unit = f" {unit}" if unit else ""
@@ -231,4 +256,5 @@ CHECKS: tuple[Callable[[Board, object], None], ...] = (
     _coil_current,
     _radii,
     _coil_settling,
+    _converters,
 )

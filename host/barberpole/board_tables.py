@@ -204,6 +204,18 @@ class Timing:
 
 
 @dataclass(frozen=True, config=STRICT)
+class Member:
+    """One sensor of an array."""
+
+    name: str
+    """Name, with which its columns begin."""
+    position_mm: tuple[Number, Number, Number]
+    """mm. Where it is, in the frame of the board."""
+    cs_pin: str = ""
+    """Chip-select pin of its converter; empty for the first sensor, whose converter is that of [adc]."""
+
+
+@dataclass(frozen=True, config=STRICT)
 class Board:
     """A board with its sensor. The keys of [board] stand here, the other tables are fields."""
 
@@ -235,6 +247,13 @@ class Board:
     timing: Timing
     watchdog_s: Annotated[float, Field(ge=0, le=32)] = 0.0
     """s. After so long without a sign of the program the board restarts; 0: never. In [board]."""
+    members: tuple[Member, ...] = ()
+    """Sensors of an array, as its file's [[array.sensors]] say; none on a board with one sensor."""
+
+    @property
+    def in_series(self) -> int:
+        """Sensors whose straps and offset coils are in series: those of the array, or one."""
+        return max(1, len(self.members))
 
     @property
     def scale_lsb_per_ut(self) -> float:

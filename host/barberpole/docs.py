@@ -4,7 +4,8 @@ import dataclasses
 import sys
 from pathlib import Path
 
-from barberpole.board_tables import Board
+from barberpole.arrays.array_file import Array
+from barberpole.board_tables import Board, Member
 from barberpole.bring_up import bring_up
 from barberpole.driver_board import Driver
 from barberpole.files import write_atomic
@@ -14,10 +15,15 @@ from barberpole.tables import describe, table_of
 
 INTRODUCTION = """# Board and sensor files
 
-Every key of `boards/<board>.toml`, `boards/drivers/<driver>.toml` and `boards/sensors/<sensor>.toml`. Written by
-`make docs` from the tables in `barberpole.board_tables`, `barberpole.driver_board` and `barberpole.sensor`;
+Every key of `boards/<board>.toml`, `boards/drivers/<driver>.toml`, `boards/arrays/<array>.toml` and
+`boards/sensors/<sensor>.toml`. Written by `make docs` from the tables in `barberpole.board_tables`,
+`barberpole.driver_board`, `barberpole.arrays.array_file` and `barberpole.sensor`;
 `barberpole.board_checks` says which values go together.
 """
+
+
+APART = (Sensor, Member)  # tables of other files
+LISTED_APART = ("members", "sensors")
 
 
 def board_reference() -> str:
@@ -25,6 +31,8 @@ def board_reference() -> str:
     parts = [INTRODUCTION, "## Boards\n"]
     parts += [_keys(name, kind) for name, kind in _tables("board", Board)]
     parts += ["## Coil drivers\n", *(_keys(name, kind) for name, kind in _tables("board", Driver))]
+    parts += ["## Arrays\n", "`boards/arrays/<array>.toml`; beside these, the tables of a board.\n"]
+    parts += [_keys("array", Array), _keys("array.sensors", Member)]
     parts += ["## Sensors\n", *(_keys(name, kind) for name, kind in _tables("sensor", Sensor))]
     return "\n".join(parts)
 
@@ -43,7 +51,7 @@ def _tables(name: str, kind: type) -> list[tuple[str, type]]:
     found = [(name, kind)]
     for field in dataclasses.fields(kind):
         inner = table_of(kind, field.name)
-        if inner and inner is not Sensor:
+        if inner and inner not in APART:
             found += _tables(f"{prefix}{field.name}", inner)
     return found
 
@@ -51,7 +59,7 @@ def _tables(name: str, kind: type) -> list[tuple[str, type]]:
 def _keys(name: str, kind: type) -> str:
     rows = [f"### [{name}]\n", f"{(kind.__doc__ or '').splitlines()[0]}\n", "| key | unit | meaning |", "|---|---|---|"]
     for field in dataclasses.fields(kind):
-        if table_of(kind, field.name) in (None, Sensor):
+        if field.name not in LISTED_APART and table_of(kind, field.name) in (None, Sensor):
             unit, meaning = _unit_and_meaning(describe(kind, field.name))
             rows.append(f"| `{field.name}` | {unit} | {meaning} |")
     return "\n".join(rows) + "\n"

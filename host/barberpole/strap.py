@@ -12,8 +12,8 @@ def strap_power_mw(board: Board) -> float:
 
 
 def strap_ohm(board: Board) -> float:
-    """The three straps in series, with the driver."""
-    return 3.0 * board.sensor.strap_ohm + board.flip.driver_ohm
+    """The three straps of every sensor in series, with the driver."""
+    return 3.0 * board.in_series * board.sensor.strap_ohm + board.flip.driver_ohm
 
 
 def strap_decay(board: Board) -> float:

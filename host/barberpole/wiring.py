@@ -97,6 +97,8 @@ def _asked(board: Board, pinout: Pinout) -> Iterator[tuple[str, str, str]]:
     for table, chip in (("adc", board.adc), ("dac", board.dac)):
         for line in LINES.get(chip.part, ()):
             yield f"{table}.{line}", getattr(chip, line), f"{line.removesuffix('_pin')} of the {chip.part}"
+    for member in board.members[1:]:
+        yield f"cs_pin of {member.name}", member.cs_pin, f"cs of the {board.adc.part} of {member.name}"
     for table, number in _bus_numbers(board).items():
         for line, port in pinout.spi.get(number, {}).items():
             yield f"{table}.spi", pinout.label(port), f"{line} of SPI {number}"

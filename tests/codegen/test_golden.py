@@ -1,15 +1,27 @@
 """The generated text against the accepted one, byte for byte."""
 
 import difflib
+import functools
 from pathlib import Path
 
 import pytest
+from barberpole.arrays.array_file import load_array_board
 from barberpole.driver_board import load_driver
+from barberpole.nominal import nominal
 from barberpole.trajectory import driver_table, for_driver
+from barberpole_codegen import array
 from barberpole_codegen.driver import board_text
 from barberpole_codegen.emit import Constant, Function, literal, module, number
 from barberpole_codegen.modules import generate, trajectory_text
+from barberpole_codegen.rows import BYTECODE
 from barberpole_codegen.trace import trace
+
+
+@functools.cache
+def array_texts():
+    gradiometer = load_array_board("gradiometer")
+    return array.generated({name: generate(gradiometer, nominal(gradiometer), BYTECODE) for name in "ab"})
+
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -38,6 +50,15 @@ def test_text_of_the_driver_is_the_accepted_one(name, update):
         path.parent.mkdir(exist_ok=True)
         path.write_text(texts[name])
     assert texts[name] == (path.read_text() if path.exists() else ""), "to accept it: pytest tests/codegen --update"
+
+
+@pytest.mark.parametrize("name", ["bp_board.py", "bp_trajectory.py", "bp_calibration_a.py", "bp_calibration_b.py"])
+def test_text_of_an_array_is_the_accepted_one(name, update):
+    path, text = GOLDEN / "array" / name, array_texts()[name]
+    if update:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    assert text == (path.read_text() if path.exists() else ""), "to accept it: pytest tests/codegen --update"
 
 
 def test_text_depends_on_nothing_else(board, calibration, generated):

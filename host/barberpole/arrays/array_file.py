@@ -1,33 +1,29 @@
-"""boards/arrays/<array>.toml: which sensors are on one board, and where.
+"""boards/arrays/<array>.toml: which sensors are on one board, where, and the board itself.
+
+[array] says what the host needs for the logs of any array. With the tables of a board file beside it, an emulated or
+real board is built from the same file: name, sensor and shielded of [board] are those of [array].
 
 The docstring under each field gives its unit and meaning.
 """
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from barberpole import paths
-from barberpole.board import find_file, load_sensor
+from barberpole.board import Board, board_of, find_file, load_sensor
+from barberpole.board_checks import check_board
+from barberpole.board_tables import Member
 from barberpole.errors import InputError, must
 from barberpole.sensor import Sensor
-from barberpole.tables import STRICT, Number, Yes, read_toml, validate
+from barberpole.tables import STRICT, Yes, read_toml, validate
 
 NAME = re.compile(r"[a-z][a-z0-9]*")  # of a sensor: it begins the names of columns
-
-
-@dataclass(frozen=True, config=STRICT)
-class Member:
-    """One sensor of the array."""
-
-    name: str
-    """Name, with which its columns begin."""
-    position_mm: tuple[Number, Number, Number]
-    """mm. Where it is, in the frame of the board."""
+SAID = ("name", "sensor", "shielded")  # of a board, by [array]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -60,18 +56,39 @@ class Array:
 
 
 def load_array(name_or_path: str | Path) -> Array:
-    """An array by name ("gradiometer") or path. Raises InputError."""
+    """An array by name ("gradiometer") or path, whatever its board. Raises InputError."""
+    return _read(name_or_path)[0]
+
+
+def load_array_board(name_or_path: str | Path) -> Board:
+    """The board of an array, its sensors as `members`. Raises InputError or LimitError."""
+    array, tables, path = _read(name_or_path)
+    head = tables.get("board")
+    if not isinstance(head, dict):
+        raise InputError(must("the array file", "one with the tables of a board", "[array] alone", path))
+    for key in SAID:
+        if key in head:
+            raise InputError(must(f"board.{key}", "left to [array]", repr(head[key]), path))
+    said = {key: getattr(array, key) for key in SAID}
+    board = board_of({**tables, "board": {**head, **said}}, path, array.sensors)
+    check_board(board, path)
+    return board
+
+
+def _read(name_or_path: str | Path) -> tuple[Array, dict[str, Any], Path]:
+    """The array, the file's other tables, and the file."""
     path = find_file(name_or_path, paths.boards() / "arrays", "array")
     tables = read_toml(path, "the array file")
-    if set(tables) != {"array"} or not isinstance(tables["array"], dict):
-        raise InputError(must("the array file", "one table [array]", ", ".join(tables) or "nothing", path))
-    content = dict(tables["array"])
+    head = tables.pop("array", None)
+    if not isinstance(head, dict):
+        raise InputError(must("the array file", "one with a table [array]", ", ".join(tables) or "nothing", path))
+    content = dict(head)
     listed = content.get("sensors")
     if isinstance(listed, list):
         content["sensors"] = [validate(Member, one, "the array file", path, "array.sensors.") for one in listed]
     array = validate(Array, content, "the array file", path, "array.")
     _check(array, path)
-    return array
+    return array, tables, path
 
 
 def _check(array: Array, path: Path) -> None:

@@ -19,7 +19,7 @@ from barberpole.files import read_bytes
 from barberpole.log import Log, checked, file_sha256
 from barberpole.log_formats import read_csv, read_parquet
 
-OF_ONE = (*READINGS, *SET, *RESET, "temp_c", "bx_ut", "by_ut", "bz_ut")
+OF_ONE = (*READINGS, *SET, *RESET, "temp_c", "bx_ut", "by_ut", "bz_ut", "cx_ut", "cy_ut", "cz_ut")
 
 
 def read_array_log(path: str | Path, array: Array) -> dict[str, Log]:
@@ -28,6 +28,11 @@ def read_array_log(path: str | Path, array: Array) -> dict[str, Log]:
     data = read_bytes(path, "the array's log")
     columns, notes, skipped, meta = _columns(data, path)
     logs = {name: _of(name, array, columns, path, file_sha256(data)) for name in array.names}
+    for name, log in logs.items():
+        empty = [column for column, values in log.columns.items() if not np.any(np.isfinite(values))]
+        if empty:
+            got = f"no number in {', '.join(empty)}"
+            raise InputError(must(f"the array's log of the sensor {name}", "one with readings", got, path))
     whole = np.all([np.all([np.isfinite(v) for v in log.columns.values()], axis=0) for log in logs.values()], axis=0)
     if not whole.any():
         raise InputError(must("the array's log", "one with complete rows", "a gap in every row", path))

@@ -1,5 +1,6 @@
 """array calibrate | selfcal | gradient: several sensors on one board."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -131,6 +132,27 @@ def simulate_logs(
         print_json({"output": str(output), "hidden_gain": {name: d.tolist() for name, d in drift.items()}})
     else:
         OUT.print(f"turned.csv, run.csv, later.csv and seen.csv written to {output}")
+
+
+def build_array(name: str, calibration: Path | None, output: Path, say: Callable[[str], None] | None) -> dict:
+    """`build` for an array; calibration: what `array calibrate` wrote. What `build --json` prints."""
+    from barberpole_codegen.array import build_array as build
+
+    from barberpole.arrays.array_file import load_array_board
+    from barberpole.arrays.for_board import of_each
+    from barberpole.arrays.keeping import read_array
+    from barberpole.nominal import nominal
+
+    board = load_array_board(name)
+    names = tuple(member.name for member in board.members)
+    if calibration:
+        used = of_each(read_array(calibration, names), board, calibration.name)
+    else:
+        used = dict.fromkeys(names, nominal(board))
+    made = build(board, used, output, say)
+    hashes = {name: of.hash for name, of in used.items()}
+    head = {"output": str(output), "role": "array", "build": made.build, "calibration": made.calibration}
+    return {**head, "sensors": hashes, "budget": made.budget}
 
 
 def _show(found, output: Path, as_json: bool) -> None:

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
+from barberpole.arrays.names import is_array
 from barberpole.calibration import read_calibration
+from barberpole.commands import array as arrays
 from barberpole.commands import imcs
 from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress, table
 from barberpole.driver_board import is_driver
@@ -39,8 +41,12 @@ def build(
 ) -> None:
     """Write the flash-resident modules, .mpy files, manifest, ROMFS image and budget."""
     if is_driver(board):
-        made = imcs.build_driver(board, replay, output, None if as_json else lambda text: OUT.print(text, style="dim"))
+        made = imcs.build_driver(board, replay, output, None if as_json else _dim)
         print_json(made) if as_json else OUT.print(f"trajectory {made['trajectory']} in {output}")
+        return
+    if is_array(board):
+        made = arrays.build_array(board, calibration, output, None if as_json else _dim)
+        print_json(made) if as_json else OUT.print(f"calibration {made['calibration']} in {output}")
         return
     from barberpole_codegen.build import build as build_board
 
@@ -49,12 +55,16 @@ def build(
 
     target = load_board(board)
     used = read_calibration(calibration) if calibration else nominal(target)
-    made = build_board(target, used, output, None if as_json else lambda text: OUT.print(text, style="dim"), path)
+    made = build_board(target, used, output, None if as_json else _dim, path)
     if as_json:
         head = {"output": str(output), "build": made.build, "calibration": made.calibration, "model": made.model}
         print_json({**head, "budget": made.budget})
     else:
         OUT.print(_budget_table(made.budget))
+
+
+def _dim(text: str) -> None:
+    OUT.print(text, style="dim")
 
 
 def _budget_table(budget: dict):

@@ -26,7 +26,7 @@ from barberpole.twin.interpreter import find_micropython
 from barberpole.twin.pins import check_pins
 from barberpole.twin.process import Power
 from barberpole.twin.running import Job
-from barberpole.twin.wiring import AnyBoard, AnyWorld, default_world
+from barberpole.twin.wiring import AnyBoard, AnyWorld, default_world, sensors_of
 
 ANSWER_S = 30.0
 STOP_S = 5.0
@@ -57,7 +57,7 @@ class Twin:
         """
         self.world: Any = default_world(board) if world is None else world
         check_pins(board)
-        self._board, self._seed, self._faults = board, check_seed(seed), check_faults(faults)
+        self._board, self._seed, self._faults = board, check_seed(seed), check_faults(faults, sensors_of(board))
         self._image = (Path(flash_dir) / f"{board.name}.lfs2").resolve()
         self._files = files or {}
         self._romfs_kib, self._frozen, self._wrap_s = romfs_kib, frozen, wrap_s
@@ -120,7 +120,7 @@ class Twin:
         """
         self.world = self.world if world is None else world
         self._seed = self._seed if seed is None else check_seed(seed)
-        self._faults = self._faults if faults is None else check_faults(faults)
+        self._faults = self._faults if faults is None else check_faults(faults, sensors_of(self._board))
         self._ask("power_on", Power(self.world, self._seed, self._faults, cut_s, self._wrap_s))
 
     def kill(self) -> None:
@@ -136,7 +136,8 @@ class Twin:
         """What the board cannot know: today's parameters (LSB, µT, mA), state, faults, incidents.
 
         scale_lsb_per_ut (at zero field and this temperature), bias_lsb, offset_lsb, noise_lsb (rms of one average of
-        samples_per_half conversions) are per axis; coil_ut_per_ma[i][j] is the field on die i of the coil j.
+        samples_per_half conversions) are per axis; coil_ut_per_ma[i][j] is the field on die i of the coil j. Of an
+        array all this stands in `sensors`, by name.
         """
         return self._ask("truth")
 

@@ -8,11 +8,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import FrameType
 
+from barberpole.arrays.array_file import load_array_board
+from barberpole.arrays.names import is_array
 from barberpole.board import load_board
 from barberpole.driver_board import is_driver, load_driver
 from barberpole.imcs.driven import read_driven
 from barberpole.twin.ambient import Stations
 from barberpole.twin.api import Twin
+from barberpole.twin.array_world import ArrayWorld
 from barberpole.twin.driven import CoilWorld
 from barberpole.twin.world import World
 
@@ -30,6 +33,7 @@ def run_twin(
     romfs_kib: int = 0,
     frozen: str | Path | None = None,
     coils: str | Path | None = None,
+    gradient: tuple[float, float, float] | None = None,
 ) -> None:
     """Start the board, print its port as the first line, and keep it until Ctrl-C or SIGTERM.
 
@@ -39,6 +43,10 @@ def run_twin(
     """
     if is_driver(board_name):
         board, world = load_driver(board_name), CoilWorld()
+    elif is_array(board_name):
+        board = load_array_board(board_name)
+        around = {"gradient_nt_per_m": gradient} if gradient else {}
+        world = ArrayWorld.of(board, tuple(hidden) or DEFAULT_HIDDEN, **around)
     else:
         board = load_board(board_name)
         around = {"ambient": in_coils(coils)} if coils else {}

@@ -21,7 +21,9 @@ def check_pins(board: Board | Driver) -> None:
         be = f"one with the {PARTS[0]} and the {PARTS[1]}, and flips timed by the program"
         raise InputError(must("the emulated board", be, f"{board.adc.part} and {board.dac.part}", board.name))
     adc, dac = board.adc, board.dac
-    flip = (board.flip.set_pin, board.flip.reset_pin) if isinstance(board, Board) else ()
+    flip: tuple[str, ...] = ()
+    if isinstance(board, Board):
+        flip = (board.flip.set_pin, board.flip.reset_pin, *(member.cs_pin for member in board.members[1:]))
     for pin in (*flip, adc.cs_pin, adc.drdy_pin, adc.reset_pin, dac.cs_pin):
         if pin not in PINS:
             raise InputError(must("a pin of the emulated board", "one of the pyboard's", pin, board.name))

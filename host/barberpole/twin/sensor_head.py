@@ -52,9 +52,15 @@ class SensorHead:
             share = 0.0
         full_ma = self.board.coils.full_scale_ma[axis]
         if f"coil_short_{AXES[axis]}" in self.faults:
-            rest_ohm = self.board.coils.series_ohm + self.board.adc.coil_shunt_ohm
-            full_ma *= (rest_ohm + self.board.sensor.offset_coil_ohm) / rest_ohm
+            coil_ohm = self.board.sensor.offset_coil_ohm
+            others_ohm = (self.board.in_series - 1) * coil_ohm
+            rest_ohm = self.board.coils.series_ohm + self.board.adc.coil_shunt_ohm + others_ohm
+            full_ma *= (rest_ohm + coil_ohm) / rest_ohm
         self.current_ma[axis] = share * full_ma
+
+    def carry(self, axis: int, current_ma: float) -> None:
+        """The current of a coil that is in series with another sensor's."""
+        self.current_ma[axis] = current_ma
 
     def jump_field(self, at_s: float) -> None:
         """The ambient field steps at at_s and stays there."""

@@ -4,7 +4,7 @@ Also charges the time that MicroPython's arithmetic takes on the real microcontr
 self-calibration point when its coil currents change, of a streamed row after the last sample of its RESET half.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,9 @@ import numpy as np
 from barberpole.board import Board
 from barberpole.twin.ads131m08 import Ads131m08
 from barberpole.twin.analog import AnalogInputs, noise_level
+from barberpole.twin.array_world import ArrayWorld
 from barberpole.twin.dac80504 import Dac80504
+from barberpole.twin.faults import of_sensor
 from barberpole.twin.noise import Noise
 from barberpole.twin.pins import PINS, bus_number
 from barberpole.twin.sensor_head import AXES, SensorHead
@@ -22,19 +24,21 @@ SET, RESET = 1, -1
 STEP_DELAY_S = 0.2  # ambient_step: after the coils were first driven
 KEPT_INCIDENTS = 100
 MAGNETISATION = 1 << 40  # its random numbers are none of the noise's, which count blocks from 0
+SEED_STEP = 1 << 44  # from one sensor of an array to the next
 FLOATING = 0xFF  # what a bus reads where nothing answers
 
 
 class Soldered:
     """Everything on the board but the microcontroller, from power-up on. Times are µs since then."""
 
-    def __init__(self, board: Board, world: World, seed: int, power_up: int, faults: frozenset[str]):
+    def __init__(self, board: Board, world: World | ArrayWorld, seed: int, power_up: int, faults: frozenset[str]):
         self.board, self.faults = board, faults
-        magnetisation = np.random.default_rng((seed, power_up, MAGNETISATION)).choice((SET, RESET), 3).tolist()
-        self.head = SensorHead(board, world, magnetisation, faults)
-        self._noise = noise_level(board, world)
-        self._inputs = AnalogInputs(self.head, Noise(self._noise, seed, power_up))
-        self._adc = Ads131m08(self._inputs, board.adc.vref_v, faults)
+        worlds = world.worlds if isinstance(world, ArrayWorld) else (world,)
+        self.sensors = [
+            Sensing(board, one, seed + SEED_STEP * index, power_up, of_sensor(faults, index))
+            for index, one in enumerate(worlds)
+        ]
+        self.head, self._adc = self.sensors[0].head, self.sensors[0].adc
         self._coil_of = {getattr(board.dac.channels, f"coil_{name}"): axis for axis, name in enumerate(AXES)}
         self._driven_at: float | None = None
         self._flip = FlipDriver(board, self)
@@ -52,13 +56,15 @@ class Soldered:
         self._on_pin = {
             PINS.index(board.flip.set_pin): partial(flip.pin, SET),
             PINS.index(board.flip.reset_pin): partial(flip.pin, RESET),
-            PINS.index(board.adc.reset_pin): self._adc.reset_pin,
+            PINS.index(board.adc.reset_pin): self._reset_adcs,
         }
-        for chip, table in ((self._adc, board.adc), (self._dac, board.dac)):
-            pin = PINS.index(table.cs_pin)
+        selects = [board.adc.cs_pin, *(member.cs_pin for member in board.members[1:])]
+        adcs = [(sensor.adc, name, board.adc.spi) for sensor, name in zip(self.sensors, selects, strict=True)]
+        for chip, name, spi in (*adcs, (self._dac, board.dac.cs_pin, board.dac.spi)):
+            pin = PINS.index(name)
             self._selected[pin] = False
-            if chip is self._adc or "dac_silent" not in self.faults:
-                self._buses[bus_number(table.spi)].append((pin, chip))
+            if chip is not self._dac or "dac_silent" not in self.faults:
+                self._buses[bus_number(spi)].append((pin, chip))
             self._on_pin[pin] = partial(self._select, pin, chip)
 
     def pin(self, t_us: int, pin: int, level: int) -> None:
@@ -71,8 +77,12 @@ class Soldered:
         """The microcontroller resets: its pins float, pulled to where nothing happens."""
         for name in (self.board.flip.set_pin, self.board.flip.reset_pin):
             self.pin(t_us, PINS.index(name), 0)
-        for name in (self.board.adc.cs_pin, self.board.dac.cs_pin, self.board.adc.reset_pin):
-            self.pin(t_us, PINS.index(name), 1)
+        for pin in (*self._selected, PINS.index(self.board.adc.reset_pin)):
+            self.pin(t_us, pin, 1)
+
+    def _reset_adcs(self, t_us: int, level: int) -> None:
+        for sensor in self.sensors:
+            sensor.adc.reset_pin(t_us, level)
 
     def transfer(self, t_us: int, bus: int, data: bytes) -> bytes:
         """Bytes over an SPI bus (`bus_number`), to the chip that is selected there and speaks its mode."""
@@ -110,7 +120,9 @@ class Soldered:
 
     def truth(self, t_us: int) -> dict:
         """What is hidden, and what went wrong."""
-        truth = self.head.truth(t_us * 1e-6, self._noise.white_v.__getitem__)
+        found = [sensor.truth(t_us) for sensor in self.sensors]
+        names = [member.name for member in self.board.members]
+        truth = {"sensors": dict(zip(names, found, strict=True))} if names else found[0]
         return {"time_s": t_us * 1e-6} | truth | {"incidents": list(self.incidents)}
 
     def note(self, t_us: float, what: str) -> None:
@@ -120,8 +132,8 @@ class Soldered:
 
     def magnetise(self, t_us: float, state: int) -> None:
         """A strap pulse has ended that was long and strong enough."""
-        self._adc.catch_up(t_us)
-        self._inputs.change(t_us, partial(self.head.magnetise, state))
+        for sensor in self.sensors:
+            sensor.change(t_us, partial(sensor.head.magnetise, state))
 
     def pulsed(self, state: int) -> None:
         """Bookkeeping of the arithmetic's time: a pulse of this polarity begins."""
@@ -145,15 +157,18 @@ class Soldered:
         if axis is None:
             return
         half_v = 0.5 * self.board.dac.vref_v * self.board.dac.gain
-        self._adc.catch_up(t_us)
-        self._inputs.change(t_us, partial(self.head.drive, axis, volts / half_v - 1.0))
+        first, *others = self.sensors
+        first.change(t_us, partial(first.head.drive, axis, volts / half_v - 1.0))
+        for sensor in others:  # in series: the same current
+            sensor.change(t_us, partial(sensor.head.carry, axis, self.head.current_ma[axis]))
         if not self._point_charged:
             self._point_charged = True
             self._charge_us += round(self.board.timing.python_us_per_selfcal_point)
         if self._driven_at is None and any(self.head.current_ma):
             self._driven_at = t_us * 1e-6
             if "ambient_step" in self.faults:
-                self.head.jump_field(self._driven_at + STEP_DELAY_S)
+                for sensor in self.sensors:
+                    sensor.head.jump_field(self._driven_at + STEP_DELAY_S)
 
     def _count_sample(self) -> None:
         if self._adc.delivered_us >= self._flip.last_us + self.board.flip.settle_us:
@@ -164,6 +179,26 @@ class Soldered:
     def _charge_row(self) -> None:
         self._charge_us += round(self.board.timing.python_us_per_row)
         self._row_samples = -1
+
+
+class Sensing:
+    """One sensor with the converter that reads it."""
+
+    def __init__(self, board: Board, world: World, seed: int, power_up: int, faults: frozenset[str]):
+        magnetisation = np.random.default_rng((seed, power_up, MAGNETISATION)).choice((SET, RESET), 3).tolist()
+        self.head = SensorHead(board, world, magnetisation, faults)
+        self._noise = noise_level(board, world)
+        self._inputs = AnalogInputs(self.head, Noise(self._noise, seed, power_up))
+        self.adc = Ads131m08(self._inputs, board.adc.vref_v, faults)
+
+    def change(self, t_us: float, act: Callable[[], None]) -> None:
+        """Do `act` to the head; what was converted before has not seen it."""
+        self.adc.catch_up(t_us)
+        self._inputs.change(t_us, act)
+
+    def truth(self, t_us: int) -> dict:
+        """What is hidden of it."""
+        return self.head.truth(t_us * 1e-6, self._noise.white_v.__getitem__)
 
 
 class FlipDriver:

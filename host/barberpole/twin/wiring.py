@@ -1,4 +1,4 @@
-"""The two roles of an emulated board behind one face: a sensor board, or a coil driver."""
+"""The roles of an emulated board behind one face: a sensor board, with one sensor or an array, or a coil driver."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -6,12 +6,13 @@ from typing import Protocol
 from barberpole.board import Board
 from barberpole.driver_board import Driver
 from barberpole.errors import InputError, must
+from barberpole.twin.array_world import ArrayWorld
 from barberpole.twin.driven import CoilWorld, Wired
 from barberpole.twin.soldered import Soldered
 from barberpole.twin.world import World
 
 AnyBoard = Board | Driver
-AnyWorld = World | CoilWorld
+AnyWorld = World | ArrayWorld | CoilWorld
 
 
 class Wiring(Protocol):
@@ -57,11 +58,18 @@ def wired(board: AnyBoard, world: AnyWorld, seed: int, power_up: int, faults: fr
     """The board's parts in their world. Raises InputError where the two are of different roles."""
     if isinstance(board, Driver) and isinstance(world, CoilWorld):
         return Wired(board, world, seed, power_up, faults)
-    if isinstance(board, Board) and isinstance(world, World):
+    if isinstance(board, Board) and isinstance(world, ArrayWorld if board.members else World):
         return Soldered(board, world, seed, power_up, faults)
     raise InputError(must("the world", "one of the board's role", type(world).__name__, board.name))
 
 
 def default_world(board: AnyBoard) -> AnyWorld:
     """The believable specimen."""
-    return CoilWorld() if isinstance(board, Driver) else World.of(board)
+    if isinstance(board, Driver):
+        return CoilWorld()
+    return ArrayWorld.of(board) if board.members else World.of(board)
+
+
+def sensors_of(board: AnyBoard) -> int:
+    """How many sensors are on a board."""
+    return board.in_series if isinstance(board, Board) else 0
