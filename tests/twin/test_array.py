@@ -153,7 +153,7 @@ def test_the_board_compensates_each_sensor(later, folder):
 
 def asked_for_status(twin, path):
     """Rows as columns, and the answer to `status`."""
-    record(twin.port, path, 30, start=lambda line: line.write(b"status\r"))
+    record(twin.port, path, 300, start=lambda line: line.write(b"status\r"))
     frames = decode(path.read_bytes()).frames
     return read_board_log(path.read_bytes(), path).columns, next(f.json for f in frames if f.type == ANSWER)
 

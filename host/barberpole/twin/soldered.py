@@ -99,8 +99,11 @@ class Soldered:
         return self._adc.ready_at(t_us)
 
     def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
-        """Frames that the converter will say next, as of Wiring; the one that ends a row is not among them."""
-        if not self._selected[PINS.index(self.board.adc.cs_pin)]:
+        """Frames that the converter will say next, as of Wiring; the one that ends a row is not among them.
+
+        None of an array: its converters are read in turn.
+        """
+        if self.board.members or not self._selected[PINS.index(self.board.adc.cs_pin)]:
             return (), b""
         if self._row_samples >= 0:
             most = min(most, self.board.adc.samples_per_half - 1 - self._row_samples)
