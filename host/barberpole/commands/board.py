@@ -155,8 +155,11 @@ def twin(
     romfs: Annotated[int, typer.Option(min=0, max=256, help="KiB of a ROMFS partition; 0: stock firmware.")] = 0,
     frozen: Annotated[Path | None, typer.Option(help="Build folder that stands in for frozen modules.")] = None,
     coils: Annotated[Path | None, typer.Option(help="Record of a coil driver, in whose coils the board lies.")] = None,
+    gradient: Annotated[
+        tuple[float, float, float], typer.Option(help="nT/m around an array, x y z along its first baseline.")
+    ] = (0.0, 0.0, 0.0),
 ) -> None:
     """Start the emulated board; its port is the first line. Ctrl-C switches it off."""
     from barberpole.twin.command import run_twin
 
-    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen, coils)
+    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen, coils, gradient)

@@ -33,20 +33,21 @@ def run_twin(
     romfs_kib: int = 0,
     frozen: str | Path | None = None,
     coils: str | Path | None = None,
-    gradient: tuple[float, float, float] | None = None,
+    gradient_nt_per_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
     """Start the board, print its port as the first line, and keep it until Ctrl-C or SIGTERM.
 
     hidden: effects of world.HIDDEN ("none": an ideal sensor; empty: its cross-field effect). flash_dir: where the
     flash image is kept; None: nowhere, the board starts empty. romfs_kib, frozen: as of Twin.
+    gradient_nt_per_m: around an array, along its first baseline.
     coils: record of a coil driver whose field the board lies in, over and over. Raises BarberpoleError.
     """
     if is_driver(board_name):
         board, world = load_driver(board_name), CoilWorld()
     elif is_array(board_name):
         board = load_array_board(board_name)
-        around = {"gradient_nt_per_m": gradient} if gradient else {}
-        world = ArrayWorld.of(board, tuple(hidden) or DEFAULT_HIDDEN, **around)
+        around = in_coils(coils) if coils else None
+        world = ArrayWorld.of(board, tuple(hidden) or DEFAULT_HIDDEN, around, gradient_nt_per_m)
     else:
         board = load_board(board_name)
         around = {"ambient": in_coils(coils)} if coils else {}
