@@ -21,7 +21,7 @@ lint: $(STAMP) $(STUBS)/.installed
 	@$(BIN)/pyright --warnings
 	@$(BIN)/pyright --warnings --project firmware/pyrightconfig.json
 	@$(BIN)/pyright --warnings --project firmware/driver/pyrightconfig.json
-	@$(BIN)/pyright --warnings --project firmware/array/pyrightconfig.json
+	@$(BIN)/pyright --warnings --project firmware/arrays/pyrightconfig.json
 
 # Time, error and memory beside plain least squares and the peers; build/bench.json keeps them for the next run.
 bench: $(STAMP) $(VENV)/.bench

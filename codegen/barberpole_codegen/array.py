@@ -30,7 +30,7 @@ SHARED = (
     *(f"bp_{name}.py" for name in ("flip", "frame", "givens", "log", "native", "points", "reasons", "records")),
     *(f"bp_{name}.py" for name in ("sampler", "selfcal", "store", "watchdog")),
 )
-"""Of the firmware of one sensor; what stands on its one calibration has its counterpart in firmware/array."""
+"""Of the firmware of one sensor; what stands on its one calibration has its counterpart in firmware/arrays."""
 
 
 def build_array(
@@ -57,7 +57,7 @@ def sources(made: Mapping[str, Generated]) -> dict[str, str]:
     """Text by file name. The role is in bp_main, which main.py of all roles runs."""
     folder = paths.firmware()
     texts = {name: (folder / name).read_text() for name in SHARED}
-    texts |= {path.name: path.read_text() for path in sorted((folder / "array").glob("*.py"))}
+    texts |= {path.name: path.read_text() for path in sorted((folder / "arrays").glob("*.py"))}
     return texts | generated(made)
 
 

@@ -54,7 +54,7 @@ def test_text_of_the_driver_is_the_accepted_one(name, update):
 
 @pytest.mark.parametrize("name", ["bp_board.py", "bp_trajectory.py", "bp_calibration_a.py", "bp_calibration_b.py"])
 def test_text_of_an_array_is_the_accepted_one(name, update):
-    path, text = GOLDEN / "array" / name, array_texts()[name]
+    path, text = GOLDEN / "arrays" / name, array_texts()[name]
     if update:
         path.parent.mkdir(exist_ok=True)
         path.write_text(text)
