@@ -217,12 +217,9 @@ def _converters(board: Board, where: object) -> None:
         return
     if board.adc.part != "ads131m08":
         raise InputError(must("adc.part", "ads131m08, whose chips keep step, on an array", board.adc.part, where))
-    first, *others = board.members
+    first = board.members[0]
     if first.cs_pin:
         raise InputError(must("cs_pin of the first sensor", "left to adc.cs_pin", repr(first.cs_pin), where))
-    for member in others:
-        if not member.cs_pin:
-            raise InputError(must(f"cs_pin of the sensor {member.name}", "given", "nothing", where))
     needed_us = board.in_series * (FRAME_BITS * 1e6 / board.adc.baud + FRAME_PROGRAM_US)
     reason = f"a conversion of adc.sample_hz, in which {board.in_series} converters are read at adc.baud"
     _at_most("the frames' time", needed_us, 1e6 / board.adc.sample_hz, "µs", reason, where)

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from barberpole import paths
-from barberpole.arrays.array_file import load_array
+from barberpole.arrays.array_file import load_array, load_array_board
 from barberpole.arrays.array_log import read_array_log
 from barberpole.arrays.calibrate import rotation
 from barberpole.cli import run as command
-from barberpole.errors import InputError
+from barberpole.errors import BarberpoleError, InputError
 from barberpole.log_formats import write_csv
 from barberpole.records import encode, encode_json
 
@@ -156,6 +156,33 @@ def test_array_files_that_cannot_be(tmp_path, old, new, reason):
     path.write_text(TEXT.replace(old, new))
     with pytest.raises(InputError, match=reason):
         load_array(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ('cs_pin = "X2"', 'cs_pin = ""', "cs_pin of b must be a pin of the PYBV11"),
+        ('cs_pin = "X2"', 'cs_pin = "X5"', "cs_pin of b must be a pin of its own"),
+        ("series_ohm = 300.0", "series_ohm = 350.0", "2 coils in series"),
+        ("strap_supply_v = 32.0", "strap_supply_v = 16.0", "six straps"),
+        ("sample_hz = 4000", "sample_hz = 8000", "the frames' time"),
+        ('mcu = "STM32F405RG"', 'name = "other"', "left to"),
+    ],
+)
+def test_boards_of_arrays_that_cannot_be(tmp_path, old, new, reason):
+    assert load_array_board("gradiometer").in_series == 2
+    path = tmp_path / "array.toml"
+    path.write_text(TEXT.replace(old, new))
+    with pytest.raises(BarberpoleError, match=reason):
+        load_array_board(path)
+    assert load_array(path).names == ("a", "b")  # the host's side does not ask
+
+
+def test_an_array_without_a_board_is_not_built(tmp_path):
+    path = tmp_path / "array.toml"
+    path.write_text(TEXT[: TEXT.index("[board]")])
+    with pytest.raises(InputError, match="tables of a board"):
+        load_array_board(path)
 
 
 def test_refusals(logs, tmp_path, capsys):
