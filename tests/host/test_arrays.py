@@ -178,6 +178,13 @@ def test_boards_of_arrays_that_cannot_be(tmp_path, old, new, reason):
     assert load_array(path).names == ("a", "b")  # the host's side does not ask
 
 
+def test_the_board_of_an_array_is_explained_pin_by_pin(capsys):
+    assert command(["board", "check", "gradiometer", "--json"]) == 0
+    pins = {pin["key"]: pin["port"] for pin in json.loads(capsys.readouterr().out)["pins"]}
+    assert pins["cs_pin of b"] == "PA1"
+    assert pins["adc.cs_pin"] != "PA1"
+
+
 def test_an_array_without_a_board_is_not_built(tmp_path):
     path = tmp_path / "array.toml"
     path.write_text(TEXT[: TEXT.index("[board]")])

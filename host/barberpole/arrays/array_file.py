@@ -62,6 +62,13 @@ def load_array(name_or_path: str | Path) -> Array:
 
 def load_array_board(name_or_path: str | Path) -> Board:
     """The board of an array, its sensors as `members`. Raises InputError or LimitError."""
+    board = read_array_board(name_or_path)
+    check_board(board, find_file(name_or_path, paths.boards() / "arrays", "array"))
+    return board
+
+
+def read_array_board(name_or_path: str | Path) -> Board:
+    """The same, well-formed, whatever it asks of its parts. Raises InputError."""
     array, tables, path = _read(name_or_path)
     head = tables.get("board")
     if not isinstance(head, dict):
@@ -70,9 +77,7 @@ def load_array_board(name_or_path: str | Path) -> Board:
         if key in head:
             raise InputError(must(f"board.{key}", "left to [array]", repr(head[key]), path))
     said = {key: getattr(array, key) for key in SAID}
-    board = board_of({**tables, "board": {**head, **said}}, path, array.sensors)
-    check_board(board, path)
-    return board
+    return board_of({**tables, "board": {**head, **said}}, path, array.sensors)
 
 
 def _read(name_or_path: str | Path) -> tuple[Array, dict[str, Any], Path]:

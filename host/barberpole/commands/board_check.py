@@ -25,11 +25,13 @@ def check(
     as_json: bool = AS_JSON,
 ) -> None:
     """Explain every conflict of pins, buses, timers, DMA, currents and times; exit 1 where there is one."""
+    from barberpole.arrays.array_file import read_array_board
+    from barberpole.arrays.names import is_array
     from barberpole.board import read_board
     from barberpole.board_checks import faults
     from barberpole.errors import InputError
 
-    board = read_board(file)
+    board = read_array_board(file) if is_array(file) else read_board(file)
     found = faults(board)
     try:
         from barberpole.wiring import uses
