@@ -87,10 +87,11 @@ def header_of(data: bytes, where: object) -> list[str]:
         line = first.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(must("the log's first line", "column names in UTF-8", "other bytes", where)) from None
-    names = [name.strip() for name in next(csv.reader([line.rstrip("\r")]))]
+    marked = line.startswith("#")  # numpy.savetxt writes its header so
+    names = [name.strip() for name in next(csv.reader([line.lstrip("# ").rstrip("\r")]), [])]
     if len(names) == 1 and any(mark in line for mark in ";\t"):
         raise InputError(must("the log's columns", "separated by commas", repr(line[:40]), where))
-    if all(_number(name) is not None for name in names):
+    if (marked and len(names) < 2) or all(_number(name) is not None for name in names):
         raise InputError(must("the log's first line", "column names such as x_lsb", repr(line[:40]), where))
     return names
 

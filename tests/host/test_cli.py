@@ -278,3 +278,38 @@ def test_ctrl_c_while_it_loads_is_silent(after_s):
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
     assert "host/barberpole" not in err  # a traceback names its files; early on it may be the interpreter's own
+
+
+def test_hard_iron_is_the_bias_and_the_tool_says_so(call, answer, turned, tmp_path):
+    code, out, err = call("fit", turned, "--model", "hard_iron,scale,misalignment", "--json")
+    assert code == 0
+    assert "bias.x" in json.loads(out)["parameters"]
+    assert err.count("hard_iron is bias") == 1
+    assert answer("effects")["aliases"] == {"hard_iron": "bias"}
+    model = tmp_path / "model.toml"
+    model.write_text(f"# mine\neffects = {json.dumps(LINEAR.split(','))}\n")
+    before = model.read_text()
+    refused(call("add", "hard_iron", "--model", model, turned), "bias", "lacks")
+    assert model.read_text() == before
+    assert answer("remove", "hard_iron", "--model", model, turned)["pays"] in (True, False)
+    assert '"bias"' not in model.read_text()
+    assert model.read_text().startswith("# mine")
+
+
+def test_a_lacking_column_has_the_name_that_a_log_gives_it(call, answer, turned):
+    why = answer("diagnose", turned, "--model", LINEAR)["cannot_be_judged"]
+    assert why["coil_coupling"] == "no ix_ma..iz_ma column"
+    refused(call("fit", turned, "--model", f"{LINEAR},coil_coupling"), "ix_ma..iz_ma", "coil_coupling")
+
+
+def test_the_header_of_numpy_savetxt_is_read_and_a_remark_is_not_taken_for_one(call, answer, turned, tmp_path):
+    plain = answer("fit", turned, "--model", LINEAR)
+    saved = tmp_path / "saved.csv"
+    saved.write_text("# " + turned.read_text())
+    assert answer("fit", saved, "--model", LINEAR) == plain
+    saved.write_text("# my log\n" + turned.read_text())
+    refused(call("fit", saved, "--model", LINEAR), "first line", "column names", "# my log")
+
+
+def test_a_game_that_is_not_there_is_said_before_the_answer_is_judged(call, tmp_path):
+    refused(call("challenge", "answer", tmp_path / "none", "bias"), "sealed answer")

@@ -93,10 +93,11 @@ def _draw(level: Level, rng: np.random.Generator) -> list[str]:
 
 def answer(folder: Path, given: tuple[str, ...]) -> Opened:
     """Open the sealed answer. Raises InputError where there is none, or for a name that is no effect."""
+    hidden = tuple(_unseal(folder / SEALED)["hidden"])
     for name in given:
         if name not in (*CATALOGUE, NOTHING, UNKNOWN):
-            raise InputError(must("the answer", f"effects, {NOTHING} or {UNKNOWN}", repr(name)))
-    return Opened(tuple(_unseal(folder / SEALED)["hidden"]), given)
+            raise InputError(must("the answer", f"of {', '.join((*CATALOGUE, NOTHING, UNKNOWN))}", repr(name)))
+    return Opened(hidden, given)
 
 
 def fall(folder: Path, opened: Opened) -> list[float]:

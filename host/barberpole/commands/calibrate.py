@@ -17,7 +17,7 @@ from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, pr
 from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut, with_magnitude
 from barberpole.diagnose import compare as compare_fit
 from barberpole.diagnose import diagnose as diagnose_log
-from barberpole.effects import Effect
+from barberpole.effects import Effect, alias_notes, listed_as
 from barberpole.errors import BarberpoleError, InputError, must
 from barberpole.fit.answer import fit_json
 from barberpole.fit.fit import Fit, fit_observations
@@ -83,6 +83,7 @@ def fit(
         calibration = with_selfcal(calibration, run, _sensor_of(data, file, sensor) or load_sensor("hmc1021_1022"))
     if output:
         write_calibration(calibration, output)
+    notes(alias_notes(file.effects))
     if as_json:
         beside = {"prior": asdict(stated)} if stated else {}
         print_json(fit_json(found, data.skipped) | published.to_json(answer, method) | beside)
@@ -150,6 +151,7 @@ def compare(
         from barberpole.report.comparison import write_comparison  # here: drawing is slow to load
 
         write_comparison(found, made, output, log.name, model)
+    notes(alias_notes(file.effects))
     if as_json:
         print_json(found.to_json())
     else:
@@ -185,6 +187,7 @@ def diagnose(
         else:
             notes(data.notes)
             show.diagnosis(path, found)
+    notes(() if bad else alias_notes(file.effects))
     return bad
 
 
@@ -214,9 +217,10 @@ def remove(
 
 def _change(effect, model, log, output, sensor, as_json, edit) -> None:
     data, before = read_log(log), read_model(model)
-    after = edit(before, effect)
+    after = edit(before, listed := listed_as(effect, before.effects))
     seen, extra = _seen(data, before, sensor)
-    found = change(seen, before, after, effect, extra)
+    found = change(seen, before, after, listed, extra)
+    notes(alias_notes((effect,)))
     if output:
         old = read_calibration(output) if output.exists() else None
         write_calibration(_with_history(found, data, found.after_file, old, edit is add_effect), output)

@@ -7,7 +7,7 @@ import typer
 
 from barberpole.commands import show
 from barberpole.commands.console import AS_JSON, OUT, print_json
-from barberpole.effects import STACK
+from barberpole.effects import ALIASES, STACK, alias_notes
 from barberpole.plugins import new_plugin
 
 
@@ -24,9 +24,11 @@ def effects(as_json: bool = AS_JSON) -> None:
     """The catalogue of physical effects, in physical order."""
     if as_json:
         listed = [{"name": e.name, "equation": e.equation, "source": e.source, "summary": e.summary} for e in STACK]
-        print_json({"effects": listed})
+        print_json({"effects": listed, "aliases": ALIASES})
     else:
         show.catalogue(STACK)
+        for sentence in alias_notes(tuple(ALIASES)):
+            OUT.print(sentence)
 
 
 def new(

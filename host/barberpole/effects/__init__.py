@@ -59,6 +59,17 @@ def find_effect(name: str, extra: Sequence[Effect] = ()) -> Effect:
     return known[wanted]
 
 
+def alias_notes(names: Sequence[str]) -> tuple[str, ...]:
+    """A sentence for each name that is an alias."""
+    return tuple(f"{name} is {ALIASES[name]}: nothing in a log separates the two" for name in names if name in ALIASES)
+
+
+def listed_as(name: str, names: Sequence[str]) -> str:
+    """The name by which `names` already holds this effect, by alias or not; else `name` itself."""
+    wanted = ALIASES.get(name, name)
+    return next((listed for listed in names if ALIASES.get(listed, listed) == wanted), name)
+
+
 def in_order(extra: Sequence[Effect] = ()) -> tuple[Effect, ...]:
     """STACK with a user's effects in their place: those on the field before the bridge, those on readings last."""
     bridge = STACK.index(CROSS_FIELD)
@@ -67,4 +78,16 @@ def in_order(extra: Sequence[Effect] = ()) -> tuple[Effect, ...]:
     return (*STACK[:bridge], *field, *STACK[bridge:], *reading)
 
 
-__all__ = ["ALIASES", "STACK", "Conditions", "Effect", "Param", "Setup", "Shape", "find_effect", "in_order"]
+__all__ = [
+    "ALIASES",
+    "STACK",
+    "Conditions",
+    "Effect",
+    "Param",
+    "Setup",
+    "Shape",
+    "alias_notes",
+    "find_effect",
+    "in_order",
+    "listed_as",
+]

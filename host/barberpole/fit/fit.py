@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from barberpole.effects import Effect, Setup, find_effect
-from barberpole.errors import InputError
+from barberpole.errors import InputError, must
 from barberpole.fit import observability
 from barberpole.fit.affine import moments
 from barberpole.fit.gram import Gram, Tick, heldout_rms
@@ -187,14 +187,15 @@ def require_columns(seen: Observations, names: Sequence[str], extra: Sequence[Ef
     for name in names:
         effect = find_effect(name, extra)
         for column in missing_columns(seen, effect):
-            raise InputError(f"log must have a {column} column for effect {effect.name}; got none")
+            raise InputError(must("the log", f"one with {column}, for effect {effect.name}", "none"))
 
 
 def missing_columns(seen: Observations, effect: Effect) -> tuple[str, ...]:
-    """Columns that an effect requires and the log lacks."""
+    """Columns that an effect requires and the log lacks, as a log names them: `at.i_ma` is its ix_ma, iy_ma, iz_ma."""
     at = seen.at
     held = {"temp_c": at.temp_c, "load_a": at.load_a, "t_s": at.t_s, "i_ma": at.i_ma, "supply_v": at.supply_v}
-    return tuple(column for column in effect.requires if held.get(column) is None)
+    lacking = (column for column in effect.requires if held.get(column) is None)
+    return tuple("ix_ma..iz_ma" if column == "i_ma" else column for column in lacking)
 
 
 def fit_problem(

@@ -29,7 +29,7 @@ def demodulated(log: Log, what: str) -> Observations:
     seen = observations(plain)
     states = np.unique(seen.at.state)
     if (1.0 in states and -1.0 in states) or not log.has(*READINGS):
-        got = "SET and RESET in turns in x_lsb.. (fit without --method takes them)"
+        got = "SET and RESET in turns in x_lsb.. (fit --model takes them)"
         raise InputError(must(what, "given demodulated readings", got, log.path))
     require_moving(seen.y, what, log.path)
     require_in_range(seen.y)
@@ -50,7 +50,7 @@ def one_magnitude(seen: Observations, otherwise_ut: float, what: str, where: obj
     if seen.b_mag is None:
         return known
     if np.ptp(seen.b_mag) > SAME * known:
-        got = f"b_ut from {seen.b_mag.min():.4g} to {seen.b_mag.max():.4g} µT (fit without --method takes them all)"
+        got = f"b_ut from {seen.b_mag.min():.4g} to {seen.b_mag.max():.4g} µT (fit --model takes them all)"
         raise InputError(must(what, "given one field magnitude", got, where))
     return known
 
