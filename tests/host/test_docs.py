@@ -96,7 +96,7 @@ def test_a_page_does_what_it_says(page, shell, tmp_path):
         if line.startswith("barberpole "):
             shell(line)
         elif line.startswith("plugins ="):
-            model = tmp_path / "game" / "model.toml"
+            model = tmp_path / "own" / "model.toml"
             model.write_text(model.read_text() + line + "\n")
     if page.name in QUOTES:
         printed = " ".join(shell.printed.split())
