@@ -28,13 +28,13 @@ def shots() -> Path:
     return SHOTS
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def folder(tmp_path_factory) -> Path:
     """The folder that the server may read and write."""
     return tmp_path_factory.mktemp("bench")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def server(folder) -> Iterator[str]:
     """`barberpole workbench` as a user starts it; its address."""
     command = [sys.executable, "-m", "barberpole", "workbench", "--port", "0", "--folder", str(folder), "--no-browser"]
@@ -75,7 +75,8 @@ def chromium() -> Iterator:
         pytest.skip("no chromium on this machine, and only root can install it: apt-get install chromium")
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
-        yield browser
+        # one context: the scripts of the page are fetched and compiled once
+        yield browser.new_context(viewport={"width": 1280, "height": 900}, reduced_motion="reduce")
         browser.close()
 
 
@@ -93,7 +94,7 @@ def find_chromium() -> str | None:
 @pytest.fixture
 def window(chromium, server):
     """A new window on the first screen."""
-    page = chromium.new_page(viewport={"width": 1280, "height": 900})
+    page = chromium.new_page()
     page.set_default_timeout(60_000)
     page.faults = []
     page.on("pageerror", lambda error: page.faults.append(str(error)))

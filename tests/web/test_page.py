@@ -6,6 +6,8 @@ from urllib.parse import urlsplit
 
 import pytest
 from barberpole.calibration import read_calibration
+from barberpole.challenge.record import Recipe, record
+from barberpole.challenge.record import write as write_log
 from barberpole.modelfile import read_model
 
 
@@ -27,6 +29,8 @@ def test_the_hidden_effect_is_seen_added_undone_and_redone(window, crossed, shot
     open_log(window, crossed)
     named(window, "cross_field")
     assert "cross_field is missing" in window.text_content("[data-test=verdict]")
+    window.wait_for_selector(".bp-chip[aria-pressed=true]:has-text('flip state × field')")  # where it fails worst
+    window.wait_for_selector("[data-test=figure-residual] h3:has-text('flip state × field')")
     before, noise = (
         figure(window, "heldout"),
         float(re.search(r"[\d.]+", window.text_content("[data-test=noise]")).group()),
@@ -171,10 +175,45 @@ def test_what_was_found_is_kept(window, crossed, folder):
     saved = read_calibration(folder / "calibration.toml")
     assert [step.added for step in saved.history] == [None, "cross_field"]
     assert saved.residual.heldout_rms_lsb == pytest.approx(figure(window, "heldout"), rel=1e-3)
+    window.click("button[aria-label='Save report']")
+    window.wait_for_selector("[data-test=kept]:has-text('report.html written')")
+    report = (folder / "report.html").read_text()
+    assert report.startswith("<!doctype html>")
+    assert "adequate" in report
+    assert "cross_field" in report
+    assert len(report) < 8e6
     window.fill("input[aria-label=Model]", "../outside.toml")
     window.click("button[aria-label='Save model']")
     window.wait_for_selector(".q-notification:has-text('must be within')")
     assert not (folder.parent / "outside.toml").exists()
+
+
+def test_firmware_is_built_from_the_page(window, crossed, folder):
+    open_log(window, crossed)
+    window.click("button:has-text('Save')")
+    window.click("button:has-text('Build')")
+    window.wait_for_selector("[data-test=kept]:has-text('Built in build')")
+    assert figure(window, "kept") > 1000  # bytes of flash
+    assert list((folder / "build").rglob("*.mpy"))
+    window.fill("input[aria-label=Folder]", "../elsewhere")
+    window.click("button:has-text('Build')")
+    window.wait_for_selector(".q-notification:has-text('must be within')")
+    assert not (folder.parent / "elsewhere").exists()
+
+
+def test_a_long_fit_is_cancelled_and_the_page_goes_on(window, tmp_path):
+    path = write_log(record(Recipe({"cross_field": 10.0}, rows=30_000, seed=5)), tmp_path / "long.csv")
+    open_log(window, path)
+    window.click("[aria-label=mains]")  # its frequency is searched for over the whole log
+    window.wait_for_selector(".bp-busy:has-text('putting mains in')")
+    window.click(".bp-busy button:has-text('Cancel')")
+    window.wait_for_selector(".q-notification:has-text('stopped while putting mains in')")
+    assert window.locator(".bp-step").count() == 1
+    window.wait_for_selector("[aria-label=mains][aria-checked=false]")  # it is not in
+    window.click("[title='temperature, °C']")
+    window.wait_for_selector("[data-test=figure-residual] h3:has-text('temperature')")
+    window.click("[aria-label=drift]")
+    window.wait_for_selector("[aria-current=step]:has-text('+ drift')")
 
 
 def test_two_models_are_compared_on_held_out_data(window, crossed):

@@ -76,17 +76,20 @@ def test_the_hidden_effect_is_first_and_takes_the_error_to_the_noise(crossed):
 
 def test_a_box_chooses_the_same_rows_in_every_picture(crossed):
     lab, bench = Lab(), Bench(crossed)
-    drawn = tasks.picture(lab, bench, View("temp_c"), ("traces", "residual", "sphere"))
+    view = View("temp_c")
+    drawn = {name: lab.picture(bench, view, name) for name in ("traces", "residual", "sphere")}
     assert all(one.title and one.sentence for one in drawn.values())
+    assert not tasks.picture(lab, bench, view, "traces").samples  # not sent
     temp, t_s = lab.log(crossed)["temp_c"], lab.log(crossed)["t_s"]
-    found = tasks.select(lab, bench, Box("temp_c", (25.0, 26.0)))
+    found = tasks.select(lab, bench, Box("temp_c", (25.0, 26.0)), view)
     wanted = (temp >= 25.0) & (temp <= 26.0)
     assert found.samples == wanted.sum()
+    assert set(found.points) == {"traces", "residual"}
     for name, by_trace in found.points.items():
         for trace, points in by_trace.items():
-            samples = lab.drawn[name].samples[trace][points]
+            samples = drawn[name].samples[trace][points]
             assert np.all(wanted[samples])
-            assert len(points) == wanted[lab.drawn[name].samples[trace]].sum()
+            assert len(points) == wanted[drawn[name].samples[trace]].sum()
     smaller = tasks.exclude(lab, bench, Box("temp_c", (25.0, 26.0)))
     assert tasks.summary(lab, smaller).n == 3000 - wanted.sum()
     again = tasks.exclude(lab, smaller, Box("t_s", (0.0, 1.0)))  # rows are those of the file, whatever is out already
@@ -96,8 +99,31 @@ def test_a_box_chooses_the_same_rows_in_every_picture(crossed):
 def test_a_residual_is_chosen_by_its_axis(crossed):
     lab, bench = Lab(), Bench(crossed)
     residual = lab.traces(bench).residual
-    assert tasks.select(lab, bench, Box("t_s", (0, 1e9), (5.0, 1e9), 1)).samples == np.sum(residual[1] >= 5.0)
-    assert tasks.select(lab, bench, Box("t_s", (0, 1e9), (5.0, 1e9))).samples == np.sum(np.any(residual >= 5.0, axis=0))
+
+    def chosen(box) -> int:
+        return tasks.select(lab, bench, box, View()).samples
+
+    assert chosen(Box("t_s", (0, 1e9), (5.0, 1e9), 1)) == np.sum(residual[1] >= 5.0)
+    assert chosen(Box("t_s", (0, 1e9), (5.0, 1e9))) == np.sum(np.any(residual >= 5.0, axis=0))
+
+
+def test_a_residual_lies_on_the_diagonal_of_the_products_that_explain_it(crossed):
+    """cross_field changes its sign with the flip state, so that no single field shows it."""
+    lab, bench = Lab(), Bench(crossed)
+    traces = lab.traces(bench)
+    worst = tasks.suspects(lab, bench).patterns[0]
+    channel, product = traces.axes.index(worst[0]), traces.abscissae[worst[1]]
+    assert product.product
+    assert product.title == "flip state × field, LSB"
+    x, y = product.values[channel], traces.residual[channel]
+    slope = float(x @ y / (x @ x))
+    assert slope == pytest.approx(1.0, abs=0.02)
+    assert np.sqrt(np.mean(x**2)) == pytest.approx(worst[3], rel=0.1)  # of all that the pattern tells
+    drawn = lab.picture(bench, View(product.name), "residual")
+    assert "diagonal" in drawn.sentence
+    high = float(np.quantile(x, 0.9))
+    found = tasks.select(lab, bench, Box(product.name, (high, 1e9), None, channel), View(product.name))
+    assert found.samples == np.sum(x >= high)
 
 
 def test_a_worker_answers_refuses_and_stops(crossed, tmp_path):
@@ -117,7 +143,7 @@ def test_a_worker_answers_refuses_and_stops(crossed, tmp_path):
     in_thread(use())
 
 
-def test_a_session_walks(crossed, tmp_path):
+def test_a_session_walks(crossed, tmp_path, monkeypatch):
     async def use() -> None:
         said = []
         session = Session(tmp_path, said.append)
@@ -133,8 +159,16 @@ def test_a_session_walks(crossed, tmp_path):
         after = session.path.now.heldout_lsb
         assert None not in (before, after)
         assert after < 0.2 * before
+        there = await session.picture(View(), "residual")
+        ask = session.hands.ask
+        monkeypatch.setattr(session.hands, "ask", None)  # the way back and forth computes nothing
         await session.walk(lambda history: history.undo())
         assert session.path.now.heldout_lsb == before
+        await session.walk(lambda history: history.redo())
+        assert there is not None
+        assert await session.picture(View(), "residual") is there
+        await session.walk(lambda history: history.undo())
+        monkeypatch.setattr(session.hands, "ask", ask)
         assert session.suspicion  # known from before
         await session.toggle("drift")
         assert session.bench.file.effects[-1] == "drift"

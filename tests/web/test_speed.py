@@ -13,10 +13,12 @@ CLICK_TO_PICTURE = """
     document.querySelector(button).click();
 })
 """
+IDLE = ".bp-suspects[data-thinking=no]"
 TURNS = 5
+SHARED = 2.0  # times the limit: the machine that measures has others on it
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def long_log(folder):
     """long_log(n): a log of n rows whose gain drifts with temperature, in the server's folder; its name."""
 
@@ -42,7 +44,7 @@ def open_named(window, name):
     window.wait_for_selector("[data-test=heldout]:has-text('LSB')", timeout=120_000)
     window.wait_for_function(f"document.querySelector('{PICTURE}')?.data?.length > 0")
     window.wait_for_selector(".bp-card.named:has-text('sensitivity_temperature')", timeout=180_000)
-    window.wait_for_timeout(1000)
+    window.wait_for_selector(IDLE)
 
 
 def clicks_ms(window, *buttons):
@@ -56,13 +58,14 @@ def test_from_a_click_to_the_new_picture(window, long_log, n, wanted_s):
     open_named(window, long_log(n))
     against = clicks_ms(window, "[title='temperature, °C']", "[title='the x field, µT']") / 1e3
     added = window.evaluate(CLICK_TO_PICTURE, ["button[aria-label='Add sensitivity_temperature']", PICTURE]) / 1e3
-    window.wait_for_timeout(500)
+    window.wait_for_selector(IDLE)
     back = window.evaluate(CLICK_TO_PICTURE, [".bp-step", PICTURE]) / 1e3
     said = f"against something else {against:.3f} s, effect added {added:.3f} s, step back {back:.3f} s"
     print(f"\nclick to picture, {n} rows (wanted {wanted_s} s): {said}", end="")
-    assert max(against, added, back) < 8 * wanted_s  # a busy machine is no failure, a lost order of magnitude is
+    assert max(against, added, back) < SHARED * wanted_s
 
 
+@pytest.mark.bench
 def test_a_million_rows_stay_responsive(window, long_log, shots):
     name = long_log(1_000_000)
     window.reload()

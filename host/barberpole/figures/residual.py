@@ -7,8 +7,8 @@ import plotly.graph_objects as go
 
 from barberpole.diagnose import Comparison, Pattern
 from barberpole.diagnose.curves import Curve, binned
-from barberpole.figures.decimate import scattered, thin
-from barberpole.figures.figure import Figure, listed, noise_band, noise_line, panels, plot
+from barberpole.figures.decimate import DRAWN, scattered, thin
+from barberpole.figures.figure import Figure, listed, noise_band, noise_line, panel, panels, plot
 from barberpole.figures.theme import GREY, look
 from barberpole.fit.noise import Noise
 from barberpole.numbers import plain, signed
@@ -50,23 +50,26 @@ def residual_against(
     pattern: Pattern | None = None,
     rows: np.ndarray | None = None,
     unit: str = "LSB",
+    dots: int = DRAWN,
 ) -> Figure:
-    """residual (m, n) against a covariate (n,) whose `name` carries its unit, such as "y field, µT".
+    """residual (m, n) against a covariate (n,) whose `name` carries its unit, such as "y field, µT"; or against one
+    of each axis (m, n). Some `dots` points of each axis are drawn; the means are of all.
 
     rows (n,): what each point is called when it is selected (customdata), by default its index. pattern: the
     dependence that was found, which then is the title.
     """
     residual, covariate = np.atleast_2d(residual), np.asarray(covariate, float)
-    rows = np.arange(covariate.size) if rows is None else rows
+    rows = np.arange(residual.shape[1]) if rows is None else rows
+    covariate = np.broadcast_to(covariate, residual.shape)
     curves = []
     figure = panels(axes, name, f"residual, {unit}")
-    for col, (axis, r) in enumerate(zip(axes, residual, strict=True), start=1):
-        at = scattered(r)
-        dots = {"color": GREY, "size": 3, "opacity": 0.45}
+    grey = {"color": GREY, "size": 3, "opacity": 0.45}
+    for col, (axis, r, value) in enumerate(zip(axes, residual, covariate, strict=True), start=1):
+        at = scattered(r, dots)
         figure.add_scatter(
-            x=thin(covariate[at]), y=thin(r[at]), mode="markers", marker=dots, customdata=rows[at], row=1, col=col
+            x=thin(value[at]), y=thin(r[at]), mode="markers", marker=grey, customdata=rows[at], **panel(col)
         )
-        curves.append(Curve(axis, name, *binned(covariate, r, Noise(np.ones(1))), x_name=name))
+        curves.append(Curve(axis, name, *binned(value, r, Noise(np.ones(1))), x_name=name))
     return _with_means(figure, curves, name, noise_lsb, pattern, unit)
 
 
@@ -96,8 +99,7 @@ def _with_means(figure: go.Figure, curves: Sequence[Curve], name: str, noise, pa
             line={"color": how.colour, "width": 1},
             marker=dots,
             name=f"{curve.axis}, mean",
-            row=1,
-            col=col,
+            **panel(col),
         )
         if noise is not None and np.isfinite(noise):
             noise_band(figure, noise, col)

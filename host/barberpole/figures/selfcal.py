@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from barberpole.figures.decimate import extremes, thin
-from barberpole.figures.figure import Figure, level, panels, plot
+from barberpole.figures.figure import Figure, level, panel, panels, plot
 from barberpole.figures.theme import VERMILLION, look
 from barberpole.numbers import plain, signed
 
@@ -43,7 +43,7 @@ def points(left: np.ndarray, unit: str = "µT") -> Figure:
     for col, (axis, r) in enumerate(zip("xyz", left, strict=True), start=1):
         at, how = extremes(r), look(axis)
         dots = {"color": how.colour, "symbol": how.symbol, "size": 5}
-        figure.add_scatter(x=at, y=thin(r[at]), mode="markers", marker=dots, name=axis, row=1, col=col)
+        figure.add_scatter(x=at, y=thin(r[at]), mode="markers", marker=dots, name=axis, **panel(col))
         level(figure, 0.0, col)
     rms = np.sqrt(np.mean(left**2, axis=1))
     each = ", ".join(f"{axis} {plain(v, 3)}" for axis, v in zip("xyz", rms, strict=True))
@@ -58,7 +58,7 @@ def error_over_time(t: np.ndarray, error: np.ndarray, unit: str = "nT", what: st
     for col, (axis, r) in enumerate(zip("xyz", error, strict=True), start=1):
         at = extremes(r)
         dots = {"color": look(axis).colour, "size": 3}
-        figure.add_scatter(x=t[at], y=thin(r[at]), mode="markers", marker=dots, name=axis, row=1, col=col)
+        figure.add_scatter(x=t[at], y=thin(r[at]), mode="markers", marker=dots, name=axis, **panel(col))
     rms = float(np.sqrt(np.mean(np.square(error))))
     each = ", ".join(f"{a} {plain(np.sqrt(np.mean(r**2)), 3)}" for a, r in zip("xyz", error, strict=True))
     sentence = f"By axis: {each} {unit} rms over {t.size} readings."

@@ -9,7 +9,7 @@ from barberpole.characterise.noise import NoiseFigures
 from barberpole.characterise.response import HALF_POWER, Response
 from barberpole.characterise.temperature import Course
 from barberpole.figures.decimate import scattered, thin
-from barberpole.figures.figure import Figure, level, panels, plot
+from barberpole.figures.figure import Figure, level, panel, panels, plot
 from barberpole.figures.theme import BEFORE, BLUE, DECADES, MODELLED, look
 from barberpole.numbers import plain, signed
 
@@ -36,8 +36,7 @@ def residual_fields(line: Linearity) -> Figure | None:
                 legendgroup=name,
                 showlegend=i == 0,
                 marker=dots,
-                row=1,
-                col=i + 1,
+                **panel(i + 1),
             )
     figure.update_layout(showlegend=True, margin={"t": 60}, legend={"y": 1.1})
     linear, bent = (1000 * float(np.sqrt(np.mean(left**2))) for _, left, _, _ in kinds)

@@ -5,12 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from barberpole.figures.figure import Figure, panels, plot
+from barberpole.figures.figure import Figure, panel, panels, plot
 from barberpole.figures.theme import COUNTED, DIVERGING, GREY
 from barberpole.numbers import signed
 
 LATITUDES = (-90, -30, 0, 30, 90)  # labels; the axis is their sine, so that equal areas look equal
 BANDS, SECTORS = 12, 24
+SMALL = {"size": 12}
+BAR = {"thickness": 12, "outlinewidth": 0, "tickfont": SMALL}
 Map = Sequence[Sequence[float | None]]
 
 
@@ -22,9 +24,9 @@ def sphere(maps: Mapping[str, Map], unit: str = "LSB") -> Figure:
         values = _numbers(rows)
         last = col == len(maps)
         colours = {"colorscale": DIVERGING, "zmin": -limit, "zmax": limit, "showscale": last}
-        bar = {"title": {"text": unit}, "thickness": 12, "outlinewidth": 0}
-        figure.add_trace(_heat(values, unit, colorbar=bar if last else None, **colours), row=1, col=col)
-        figure.add_trace(_never(np.isnan(values)), row=1, col=col)
+        bar = BAR | {"title": {"text": unit, "font": SMALL}}
+        figure.add_trace(_heat(values, unit, colorbar=bar if last else None, **colours, **panel(col)))
+        figure.add_trace(_never(np.isnan(values), **panel(col)))
     _degrees(figure)
     return Figure(figure, *_words(maps, unit))
 
@@ -33,7 +35,7 @@ def coverage(field: np.ndarray) -> Figure:
     """field (3, n), any unit: how many readings were taken in each direction."""
     counts = direction_counts(field)
     figure = plot("longitude, °", "latitude, °")
-    bar = {"title": {"text": "readings"}, "thickness": 12, "outlinewidth": 0}
+    bar = BAR | {"title": {"text": "readings", "font": SMALL}}
     shown = np.where(counts > 0, counts, np.nan).astype(float)
     figure.add_trace(_heat(shown, "readings", colorscale=COUNTED, colorbar=bar))
     figure.add_trace(_never(counts == 0))
@@ -71,16 +73,16 @@ def _heat(values: np.ndarray, unit: str, **how) -> go.Heatmap:
     return go.Heatmap(z=values, x=x, y=y, customdata=latitude, hovertemplate=hover, **how)
 
 
-def _never(absent: np.ndarray) -> go.Scatter:
+def _never(absent: np.ndarray, **place: str) -> go.Scatter:
     """A small cross in each cell that was never seen."""
     x, y = _centres(absent.shape)
     row, column = np.nonzero(absent)
     cross = {"symbol": "x-thin", "size": 4, "line": {"color": GREY, "width": 1}}
-    return go.Scatter(x=x[column], y=y[row], mode="markers", marker=cross, hoverinfo="skip", showlegend=False)
+    return go.Scatter(x=x[column], y=y[row], mode="markers", marker=cross, hoverinfo="skip", showlegend=False, **place)
 
 
 def _degrees(figure: go.Figure) -> None:
-    figure.update_xaxes(tickvals=[-120, -60, 0, 60, 120], range=[-180, 180], showgrid=False, zeroline=False)
+    figure.update_xaxes(tickvals=[-120, 0, 120], tickangle=0, range=[-180, 180], showgrid=False, zeroline=False)
     sines = [float(np.sin(np.radians(v))) for v in LATITUDES]
     figure.update_yaxes(
         tickvals=sines, ticktext=[str(v) for v in LATITUDES], range=[-1, 1], showgrid=False, zeroline=False

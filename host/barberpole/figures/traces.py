@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from barberpole.figures.decimate import extremes, thin
+from barberpole.figures.decimate import DRAWN, extremes, thin
 from barberpole.figures.figure import Figure
 from barberpole.figures.theme import LIGHT, MEASURED, look
 from barberpole.numbers import plain
@@ -21,13 +21,17 @@ def traces(
     axes: Sequence[str] = ("x", "y", "z"),
     unit: str = "LSB",
     t_name: str = "time, s",
+    dots: int = DRAWN,
 ) -> Figure:
-    """t (n,), measured and modelled (m, n): one row an axis, peaks kept, and a last row with the residual of all."""
+    """t (n,), measured and modelled (m, n): one row an axis, peaks kept, and a last row with the residual of all.
+
+    Some `dots` points of what was measured are drawn of each axis.
+    """
     t, measured, modelled = np.asarray(t), np.atleast_2d(measured), np.atleast_2d(modelled)
     rows = len(axes) + 1
     figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.04)
     for row, axis in enumerate(axes):
-        _pair(figure, row + 1, axis, t, measured[row], modelled[row])
+        _pair(figure, row + 1, axis, t, measured[row], modelled[row], dots)
         figure.update_yaxes(title_text=f"{axis}, {unit}", row=row + 1, col=1)
         left = measured[row] - modelled[row]
         at = extremes(left)
@@ -47,13 +51,14 @@ def traces(
     return Figure(figure, title, sentence)
 
 
-def _pair(figure: go.Figure, row: int, axis: str, t: np.ndarray, measured: np.ndarray, modelled: np.ndarray) -> None:
-    at = extremes(measured)
+def _pair(figure: go.Figure, row: int, axis: str, t: np.ndarray, measured, modelled, most: int) -> None:
+    at = extremes(measured, most)
     shared = {"row": row, "col": 1, "showlegend": row == 1}
     dots = {"color": MEASURED, "size": 4}
     figure.add_scatter(
         x=t[at], y=thin(measured[at]), mode="markers", marker=dots, name="measured", legendgroup="m", **shared
     )
+    at = extremes(modelled)
     line = {"color": look(axis).colour, "width": 1.2}
     figure.add_scatter(
         x=t[at], y=thin(modelled[at]), mode="lines", line=line, name="modelled", legendgroup="f", **shared

@@ -13,6 +13,7 @@ from barberpole.numbers import plain
 
 LOGARITHMIC = 8.0  # times the noise: a larger fall needs a logarithmic axis
 FLOOR = 1.1  # times the noise: an error below it is at the floor
+WIDE = 72  # letters that fit under all stages together
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,8 @@ def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
     said = "%{text}: %{y:.4g} LSB<extra></extra>"
     how = {"mode": "markers", "text": names, "hovertemplate": said, "marker": dots}
     figure.add_scatter(x=place, y=left, cliponaxis=False, showlegend=False, **how)
-    labels = [_label(s, before) for s, before in zip(stages, [None, *left[:-1]], strict=True)]
+    room = WIDE // len(stages)
+    labels = [_label(s, before, room) for s, before in zip(stages, [None, *left[:-1]], strict=True)]
     figure.update_xaxes(tickvals=place, ticktext=labels, tickangle=0, range=[-0.5, len(place) - 0.5], showgrid=False)
     if steep:
         figure.update_yaxes(DECADES | {"type": "log", "dtick": "D2"})
@@ -70,11 +72,19 @@ def waterfall(stages: Sequence[Stage], noise_lsb: float) -> Figure:
     return Figure(figure, *_words(stages, noise_lsb))
 
 
-def _label(stage: Stage, before: float | None) -> str:
-    """Name, error and change under a stage; a long name is broken where it can be."""
-    name = stage.name.replace("_", "_<br>", 1).replace(", ", ",<br>")
+def _label(stage: Stage, before: float | None, room: int) -> str:
+    """Name, error and change under a stage; a name of more letters than there is room for is broken where it can be."""
     change = "" if before is None else f" ({100 * (stage.heldout_lsb / before - 1.0):+.0f} %)"
-    return f"{name}<br><b>{plain(stage.heldout_lsb)}</b>{change}"
+    return f"{_broken(stage.name, room)}<br><b>{plain(stage.heldout_lsb)}</b>{change}"
+
+
+def _broken(name: str, room: int) -> str:
+    """In two lines, at the comma or the underscore nearest to the middle, where one would be too long."""
+    breaks = [at + 1 for at, letter in enumerate(name) if letter in ",_"]
+    if len(name) <= room or not breaks:
+        return name
+    at = min(breaks, key=lambda place: abs(place - len(name) / 2))
+    return f"{name[:at]}<br>{name[at:].strip()}"
 
 
 def _words(stages: Sequence[Stage], noise: float) -> tuple[str, str]:

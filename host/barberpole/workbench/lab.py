@@ -20,7 +20,7 @@ from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations, observations
 from barberpole.plugins import load_plugins
 from barberpole.workbench.bench import Bench
-from barberpole.workbench.pictures import Picture
+from barberpole.workbench.pictures import Picture, View, draw
 from barberpole.workbench.traces import Traces, traces_of
 
 KEPT = 24  # fits
@@ -40,9 +40,9 @@ class Kept(OrderedDict):
         """What is kept under a key, or what `make` gives."""
         if key not in self:
             self[key] = make()
-            while len(self) > self.most:
-                self.popitem(last=False)
         self.move_to_end(key)
+        while len(self) > self.most:
+            self.popitem(last=False)
         return self[key]
 
 
@@ -61,7 +61,8 @@ class Opened:
 
 @dataclass(frozen=True)
 class Summary:
-    """A fit in figures. parameters: (name, value, standard error, unit)."""
+    """A fit in figures. parameters: (name, value, standard error, unit); abscissae: what the residual may be drawn
+    against, name -> title with unit."""
 
     n: int
     rms_lsb: float
@@ -71,6 +72,7 @@ class Summary:
     converged: bool
     parameters: tuple[tuple[str, float, float, str], ...]
     unobservable: tuple[str, ...]
+    abscissae: dict[str, str]
 
 
 class Lab:
@@ -80,7 +82,7 @@ class Lab:
         self._logs, self._seen = Kept(KEPT_LARGE), Kept(KEPT_LARGE)
         self._fits, self._traces, self._own = Kept(KEPT), Kept(KEPT_LARGE), Kept(KEPT)
         self.tick: Tick | None = None
-        self.drawn: dict[str, Picture] = {}
+        self._pictures = Kept(KEPT)
 
     def log(self, path: Path) -> Log:
         """A log, read again where the file has changed."""
@@ -132,12 +134,23 @@ class Lab:
         fit = self.fit(bench)
         rows = zip(fit.model.names, fit.p, fit.stderr, fit.model.params, fit.free, strict=True)
         parameters = tuple((name, float(v), float(s), q.unit) for name, v, s, q, free in rows if free)
-        residual = self.traces(bench).residual
-        noise = noise_from_differences(residual)
-        error = _field_error(fit, self.traces(bench))
+        traces = self.traces(bench)
         return Summary(
-            fit.problem.n, fit.rms_lsb, fit.heldout_rms_lsb, noise, error, fit.converged, parameters, fit.unobservable
+            fit.problem.n,
+            fit.rms_lsb,
+            fit.heldout_rms_lsb,
+            noise_from_differences(traces.residual),
+            _field_error(fit, traces),
+            fit.converged,
+            parameters,
+            fit.unobservable,
+            {one.name: one.title for one in traces.abscissae.values()},
         )
+
+    def picture(self, bench: Bench, view: View, name: str) -> Picture:
+        """A picture of a fit, with the samples that its points stand for."""
+        view = view.of(name)
+        return self._pictures.get_or((bench.key, name, view), lambda: draw(self.traces(bench), view, name))
 
     def with_effect(self, bench: Bench, effect: str, settings: dict | None = None) -> Bench:
         """The bench with one more effect, in the form (settings) given or the one that gains most in this log."""

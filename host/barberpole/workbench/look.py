@@ -60,9 +60,17 @@ RULES = """
 .bp-fall u { position:absolute; top:0; bottom:0; width:0; border-left:2px dashed var(--ink); transition:left .45s; }
 .bp-figure { display:flex; justify-content:space-between; font-size:13px; margin-top:4px;
   font-variant-numeric:tabular-nums; }
+.bp-pattern { display:block; width:100%; text-align:left; border:0; background:none; color:var(--quiet); padding:3px 0;
+  cursor:pointer; font-size:12.5px; line-height:1.35; }
+.bp-pattern:hover { color:var(--accent); }
+.bp-blind { border-top:1px solid var(--grid); padding:7px 0 8px; font-size:12.5px; color:var(--quiet); }
+.bp-names { display:flex; flex-wrap:wrap; gap:4px; margin-top:4px; }
+.bp-name { background:var(--raised); color:var(--ink); border-radius:5px; padding:0 6px; }
+.bp-next-step { font-size:13.5px; border-left:3px solid var(--accent); padding-left:10px; margin:0; }
 .bp-chips { display:flex; flex-wrap:wrap; gap:4px; margin:6px 0 2px; }
 .bp-chip { border:1px solid var(--grid); border-radius:12px; padding:1px 9px; font-size:12.5px; background:none;
   color:var(--ink); cursor:pointer; }
+.bp-chip.follows { border-color:var(--accent); color:var(--accent); }
 .bp-chip:hover { border-color:var(--accent); }
 .bp-chip[aria-pressed=true] { background:var(--accent); color:var(--paper); border-color:var(--accent); }
 .bp-step { display:flex; align-items:baseline; gap:6px; width:100%; text-align:left; padding:3px 6px; border-radius:5px;

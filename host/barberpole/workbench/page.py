@@ -1,6 +1,8 @@
 """The page: one window, one session. This module lays it out and tells each part when to look again."""
 
+import asyncio
 import inspect
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -24,6 +26,8 @@ from barberpole.workbench.page_verdict import Verdict
 from barberpole.workbench.session import Session
 from barberpole.workbench.watch import Watch
 from barberpole.workbench.widgets import complain, press, text_of
+
+SENT_S = 0.02  # what was changed goes to the browser within this time
 
 
 def build(folder: Path, log: Path | None = None) -> None:
@@ -51,12 +55,15 @@ class Page:
     seed: int | None = None
     trial: Trial | None = None
     watched: Watch | None = None
-    parts: dict[str, list] = field(default_factory=dict)
+    pictures: Pictures | None = None
+    parts: dict[str, dict[int, Callable]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.client = ui.context.client
         self.theme = ui.dark_mode(value=None)
         self.session.on_change = self.changed
+        self._due: dict[int, Callable] = {}
+        self._painting = False
 
     def colours(self) -> None:
         """The palette of the pictures for buttons and switches."""
@@ -70,6 +77,7 @@ class Page:
         self.body = ui.element("div").style("width:100%")
         self._busy()
         ui.keyboard(self._key, ignore=["input", "select", "textarea"])
+        ui.on("bp_seen", lambda e: self.pictures and self.pictures.seen(e.args["name"], e.args["in_view"]))
         self.show_start()
 
     def _header(self) -> None:
@@ -114,11 +122,18 @@ class Page:
             elif event.key == "y":
                 await self.session.walk(lambda h: h.redo())
 
+    async def look_at(self, against: str) -> None:
+        """Draw the residual against something that a pattern names."""
+        summary = self.session.summary
+        if self.pictures is not None and summary is not None and against in summary.abscissae:
+            await self.pictures.look_at(against)
+
     def show_start(self) -> None:
         """The first screen."""
         self.unwatch()
         self.body.clear()
         self.parts.clear()
+        self._due.clear()
         self.tools.set_visibility(False)
         self.log_name.text = ""
         uploads = Path(self.session.own.name)
@@ -159,6 +174,7 @@ class Page:
         self.bench_tools.set_visibility(False)
         self.body.clear()
         self.parts.clear()
+        self._due.clear()
         with self.body:
             Live(self, watch)
 
@@ -188,10 +204,22 @@ class Page:
             elif part == "busy":
                 self.busy.set_visibility(bool(self.session.busy))
                 self.busy_text.text = f"{self.session.busy} …"
-            for show in self.parts.get(part, ()):
-                made = show()
-                if inspect.iscoroutine(made):
-                    background_tasks.create(made)
+            self._due |= self.parts.get(part, {})
+            if self._due and not self._painting:
+                self._painting = True
+                background_tasks.create(self._paint())
+
+    async def _paint(self) -> None:
+        """Show what has changed, what is looked at first, each once, and each sent off before the next is made."""
+        try:
+            while self._due:
+                with self.client:
+                    made = self._due.pop(min(self._due))()
+                    if inspect.iscoroutine(made):
+                        await made
+                await asyncio.sleep(SENT_S)
+        finally:
+            self._painting = False
 
     def _show_bench(self) -> None:
         opened = self.session.opened
@@ -204,14 +232,15 @@ class Page:
         self.bench_tools.set_visibility(True)
         self.body.clear()
         self.parts.clear()
+        self._due.clear()
         with self.body:
             verdict = Verdict(self)
             with ui.element("main").classes("bp-main"):
                 self._left()
                 with ui.element("section").classes("bp-mid"):
-                    pictures = Pictures(self)
+                    self.pictures = Pictures(self)
                 self._right()
-        self._listen(verdict, pictures)
+        self._listen(verdict, self.pictures)
 
     def _left(self) -> None:
         with ui.element("nav").classes("bp-side"):
@@ -232,11 +261,14 @@ class Page:
             press("Write an effect of your own", "bp-chip", self.editor.open).style("margin-top:14px")
 
     def _listen(self, verdict: Verdict, pictures: Pictures) -> None:
-        again = [lambda p=part: p.refresh() for part in (self.stack, self.history, self.parameters, self.suspects)]
-        stack, history, parameters, suspects = again
-        self.parts.update(
-            history=[stack, history],
-            fit=[verdict.show, history, parameters, pictures.draw],
-            suspects=[verdict.show, suspects, pictures.judged],
-            ground=[pictures.draw],
-        )
+        first: dict[int, Callable] = {0: verdict.show, 1: pictures.draw, 2: pictures.judged}
+        later: dict[int, Callable] = {3: self.history.refresh, 4: self.suspects.refresh, 5: pictures.rest}
+        last: dict[int, Callable] = {6: self.stack.refresh, 7: self.parameters.refresh}
+        shows = {
+            "history": (3, 6),
+            "fit": (0, 1, 3, 5, 7),
+            "suspects": (0, 2, 4),
+            "ground": (1, 5),
+        }
+        every = first | later | last
+        self.parts.update({part: {turn: every[turn] for turn in turns} for part, turns in shows.items()})

@@ -12,8 +12,16 @@ from barberpole.workbench.widgets import press, text_of
 if TYPE_CHECKING:
     from barberpole.workbench.page import Page
 
-WANTED = ("traces", "residual", "sphere")
 PATH_HEIGHT = 300
+WATCH = """
+const look = new IntersectionObserver(seen => seen.forEach(one => emitEvent(
+    'bp_seen', {name: one.target.dataset.test.slice(7), in_view: one.isIntersecting})), {rootMargin: '150px'});
+const find = () => {
+    const all = document.querySelectorAll('.bp-main figure');
+    all.length ? all.forEach(one => look.observe(one)) : setTimeout(find, 30);
+};
+setTimeout(find, 30);  // once the page has them
+"""
 
 
 class Frame:
@@ -43,6 +51,9 @@ class Pictures:
         self._box: Box | None = None
         self._path_drawn: tuple | None = None
         self._noise_drawn: float | None = None
+        self._asked = False
+        self._stale: set[str] = set()
+        self._in_view: set[str] = set()
         self._brush_bar()
         self._frames = {
             "residual": Frame("residual", HEIGHTS["residual"], self._chips),
@@ -54,6 +65,7 @@ class Pictures:
             plot = self._frames[name].plot
             plot.on("plotly_selected", lambda e, n=name: self._selected(n, e), args=["range"])
             plot.on("plotly_deselect", self._clear)
+        ui.run_javascript(WATCH)
 
     def _brush_bar(self) -> None:
         with ui.element("div").classes("bp-brush").style("padding:0 16px"):
@@ -69,9 +81,10 @@ class Pictures:
     def _chips(self) -> None:
         self._row = ui.element("div").classes("bp-chips").props("role=group aria-label='Residual against'")
         self._buttons: dict[str, ui.element] = {}
+        self._marks: dict[str, tuple[bool, bool]] = {}
 
     def _fill_chips(self) -> None:
-        known = self._session.abscissae
+        known = self._session.summary.abscissae if self._session.summary else {}
         if set(known) != set(self._buttons):
             self._row.clear()
             with self._row:
@@ -79,41 +92,82 @@ class Pictures:
                     name: press(_chip(title), "bp-chip", lambda n=name: self.look_at(n), title=title)
                     for name, title in known.items()
                 }
+            self._marks = {}
+        follows = {against for _, against, _, _ in self._patterns()}
         for name, button in self._buttons.items():
-            button.props(f"aria-pressed={'true' if name == self.against else 'false'}")
+            marks = (name == self.against, name in follows)
+            if self._marks.get(name) != marks:
+                self._marks[name] = marks
+                button.props(f"aria-pressed={'true' if marks[0] else 'false'}")
+                button.classes(add="follows" if marks[1] else "", remove="" if marks[1] else "follows")
+
+    def _patterns(self) -> tuple[tuple[str, str, str, float], ...]:
+        return self._session.suspicion.patterns if self._session.suspicion else ()
 
     async def look_at(self, against: str) -> None:
         """Draw the residual against something else."""
-        self.against = against
+        self.against, self._asked = against, True
+        await self._draw("residual")
         self._fill_chips()
-        await self._draw(("residual",))
 
     async def draw(self) -> None:
-        """All pictures of what is on the bench."""
+        """What is looked at first, of what is on the bench; `rest` draws the others."""
         self._forget()
+        summary = self._session.summary
+        if summary is None:
+            return
+        if self.against not in summary.abscissae:
+            self.against = "t_s"
+        await self._draw("residual")
+
+    async def rest(self) -> None:
+        """The other pictures: now where they are in view, else when they come into it."""
         if self._session.summary is None:
             return
-        if self.against not in self._session.abscissae:
-            self.against = "t_s"
         self._fill_chips()
         self._back.set_visibility(bool(self._session.bench.excluded))
-        await self._draw(("residual",))  # what is looked at first
-        self.draw_path()
-        for name in ("traces", "sphere"):
-            await self._draw((name,))
+        self._stale = {"traces", "path", "sphere"}
+        for name in ("traces", "path", "sphere"):
+            await self._freshen(name)
 
-    async def _draw(self, wanted: tuple[str, ...]) -> None:
-        view = View(self.against, self._session.noise_lsb, self._page.dark)
-        if "residual" in wanted:
-            self._noise_drawn = view.noise_lsb
-        for name, picture in (await self._session.pictures(view, wanted)).items():
+    async def seen(self, name: str, in_view: bool) -> None:
+        """A picture has come into view, or left it."""
+        self._in_view = self._in_view | {name} if in_view else self._in_view - {name}
+        await self._freshen(name)
+
+    async def _freshen(self, name: str) -> None:
+        if name in self._stale and name in self._in_view and self._session.summary is not None:
+            self._stale.discard(name)
+            if name == "path":
+                self.draw_path()
+            else:
+                await self._draw(name)
+
+    async def _draw(self, name: str) -> None:
+        if name == "residual":
+            self._noise_drawn = self._session.noise_lsb
+        picture = await self._session.picture(self._view(), name)
+        if picture is not None:
             self._frames[name].show(picture)
 
+    def _view(self) -> View:
+        return View(self.against, self._noise_drawn, self._page.dark)
+
     async def judged(self) -> None:
-        """The noise may be known by now."""
-        self.draw_path()
-        if self._noise_drawn is None and self._session.noise_lsb is not None:
-            await self._draw(("residual",))
+        """The noise may be known by now, and where the model fails worst: that is drawn unless something else was asked
+        for."""
+        summary, unknown = self._session.summary, self._noise_drawn is None and self._session.noise_lsb is not None
+        worst = next((p[1] for p in self._patterns() if summary and p[1] in summary.abscissae), self.against)
+        turn = not self._asked and worst != self.against
+        if self._session.suspicion is not None:
+            self._asked = True  # what is looked at stays while effects come and go
+        if turn:
+            self.against = worst
+        if turn or unknown:
+            await self._draw("residual")
+        self._fill_chips()
+        self._stale.add("path")
+        await self._freshen("path")
 
     def draw_path(self) -> None:
         """The error along the path."""
@@ -136,7 +190,7 @@ class Pictures:
         box = box_of(name, event.args.get("range") or {}, self.against)
         if box is None:
             return
-        found = await self._session.select(box)
+        found = await self._session.select(box, self._view())
         if found is None:
             return
         self._box = box

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from barberpole.workbench.suspects import Suspect
-from barberpole.workbench.widgets import text_of
+from barberpole.workbench.suspects import Suspect, Suspicion
+from barberpole.workbench.widgets import press, sentence, text_of
 
 if TYPE_CHECKING:
     from barberpole.workbench.page import Page
@@ -14,8 +14,14 @@ MOST = 8
 
 
 def show_suspects(page: "Page") -> None:
-    """Cards, the named first."""
+    """Cards, the named first; once nothing is missing, what this log cannot tell and what to measure next."""
     found = page.session.suspicion
+    thinking = "yes" if page.session.thinking else "no"
+    with ui.element("section").classes("bp-suspects").props(f"data-thinking={thinking}"):
+        _listed(page, found)
+
+
+def _listed(page: "Page", found: Suspicion | None) -> None:
     text_of("Suspects", "h2", "bp-h")
     if found is None:
         text_of("Looking …" if page.session.thinking else "None yet.", "p", "bp-small")
@@ -27,12 +33,29 @@ def show_suspects(page: "Page") -> None:
     if found.patterns and found.verdict != "adequate":
         text_of("What the residual follows", "h2", "bp-h").style("margin-top:14px")
         for axis, against, shape, rms in found.patterns[:5]:
-            text_of(f"{axis}: {shape} in {against}, {rms:.3g} LSB rms", "p", "bp-small")
+            said = f"{axis}: {shape}, {rms:.3g} LSB rms"
+            press(said, "bp-pattern", lambda name=against: page.look_at(name), title="draw it")
+    _blind(found)
+
+
+def _blind(found: Suspicion) -> None:
+    """What this log could not show even if it were there, by reason, and the experiment that would."""
+    reasons: dict[str, list[str]] = {}
+    for name, why in found.cannot_be_judged.items():
+        reasons.setdefault(why, []).append(name)
     if found.cannot_be_seen:
-        text_of(f"This log cannot show {', '.join(found.cannot_be_seen)}.", "p", "bp-small").style("margin-top:10px")
-    for why in sorted(set(found.cannot_be_judged.values())):
-        names = [name for name, reason in found.cannot_be_judged.items() if reason == why]
-        text_of(f"Not judged ({why}): {', '.join(names)}.", "p", "bp-small")
+        reasons["looks like what the model has already"] = list(found.cannot_be_seen)
+    if reasons:
+        text_of("What this log cannot see", "h2", "bp-h").style("margin-top:16px")
+    for why, names in sorted(reasons.items()):
+        with ui.element("div").classes("bp-blind"):
+            text_of(why, "div")
+            with ui.element("div").classes("bp-names"):
+                for name in sorted(names):
+                    text_of(name, "span", "bp-name")
+    if found.next_experiment and found.verdict == "adequate":
+        text_of("Measure next", "h2", "bp-h").style("margin-top:16px")
+        text_of(sentence(found.next_experiment), "p", "bp-next-step")
 
 
 def _card(page: "Page", suspect: Suspect) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from barberpole.workbench.suspects import Suspicion
-from barberpole.workbench.widgets import text_of
+from barberpole.workbench.widgets import sentence, text_of
 
 if TYPE_CHECKING:
     from barberpole.workbench.page import Page
@@ -68,14 +68,14 @@ def sentences(found: Suspicion | None, thinking: bool) -> tuple[str, str]:
     if found is None:
         return ("Looking for what is missing …" if thinking else "Not judged yet"), ""
     named = [s.effect for s in found.suspects if s.named]
-    following = found.next_experiment
+    following = sentence(found.next_experiment)
     if found.verdict == "missing":
         verb = "is" if len(named) == 1 else "are"
         rivals = [r for s in found.suspects if s.named for r in s.confounded_with]
         doubt = f", or {', '.join(rivals)}: this log cannot tell" if rivals else ""
         return f"{' and '.join(named)} {verb} missing from the model{doubt}", following
     if found.verdict == "adequate":
-        return "The model is adequate: what is left is noise", following
+        return "The model is adequate: what is left is noise", "What this log cannot see is on the right."
     if found.verdict == "unexplained":
         return "Something is left that no known effect explains", following or "See what it follows, below."
     return "This log cannot carry a verdict", following

@@ -5,7 +5,7 @@ that a choice made in one picture is shown in all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,10 @@ from barberpole.workbench.traces import Traces, inside
 
 READINGS = ("x", "y", "z")
 CHOSEN = "#CC79A7"  # reddish purple of the same palette
-DOTS = 450  # of a panel
-GIANT = 15  # one dot in so many is kept for its size
+DOTS = 400  # of a panel: a browser redraws each of them at every click
+TEMPLATES = {False: figures.LIGHT.to_plotly_json(), True: figures.DARK.to_plotly_json()}
+COMBINED = "The products are combined as each residual follows them: what they explain lies on the diagonal."
+CHOOSABLE = ("traces", "residual")  # pictures in which a box may be drawn
 HEIGHTS = {"traces": 470, "residual": 300, "sphere": 270}
 
 
@@ -29,6 +31,10 @@ class View:
     against: str = "t_s"
     noise_lsb: float | None = None
     dark: bool = False
+
+    def of(self, name: str) -> "View":
+        """As far as it matters to one picture."""
+        return self if name == "residual" else View(dark=self.dark)
 
 
 @dataclass(frozen=True)
@@ -62,22 +68,18 @@ class Chosen:
     points: dict[str, dict[int, list[int]]]
 
 
-def draw(traces: Traces, view: View, wanted: Sequence[str]) -> dict[str, Picture]:
-    """The pictures asked for, by name."""
-    makers = {"traces": _traces, "residual": _residual, "sphere": _sphere}
-    return {name: makers[name](traces, view) for name in wanted}
+def draw(traces: Traces, view: View, name: str) -> Picture:
+    """The picture of that name."""
+    return {"traces": _traces, "residual": _residual, "sphere": _sphere}[name](traces, view)
 
 
 def _traces(traces: Traces, view: View) -> Picture:
     at = traces.abscissae["t_s"]
-    figure = figures.traces(at.values, traces.measured, traces.modelled, READINGS, t_name=at.title)
-    samples = {}
-    for number, trace in enumerate(_drawn(figure)):
-        if trace.mode == "markers":
-            axis = int((trace.yaxis or "y")[1:] or 1) - 1
-            samples[number] = extremes(traces.measured[axis])
-    figure.plot.update_layout(height=HEIGHTS["traces"], selectdirection="h")
-    return _sent(figure, view, samples)
+    figure = figures.traces(at.values, traces.measured, traces.modelled, READINGS, t_name=at.title, dots=DOTS)
+    samples, markers = {}, [n for n, trace in enumerate(_drawn(figure)) if trace.mode == "markers"]
+    for axis, number in enumerate(markers):
+        samples[number] = extremes(traces.measured[axis], DOTS)
+    return _sent(figure, view, samples, height=HEIGHTS["traces"], selectdirection="h")
 
 
 def _drawn(figure: figures.Figure) -> Sequence[Any]:
@@ -87,46 +89,35 @@ def _drawn(figure: figures.Figure) -> Sequence[Any]:
 def _residual(traces: Traces, view: View) -> Picture:
     against = traces.abscissae[view.against]
     figure = figures.residual_against(
-        traces.residual, against.values, against.title, traces.axes, noise_lsb=view.noise_lsb
+        traces.residual, against.values, against.title, traces.axes, noise_lsb=view.noise_lsb, dots=DOTS
     )
     samples = {i: np.asarray(t.customdata) for i, t in enumerate(_drawn(figure)) if t.customdata is not None}
-    figure.plot.update_layout(height=HEIGHTS["residual"])
-    return _sent(figure, view, samples)
+    if against.product:
+        figure = replace(figure, sentence=f"{figure.sentence} {COMBINED}")
+    return _sent(figure, view, samples, height=HEIGHTS["residual"])
 
 
 def _sphere(traces: Traces, view: View) -> Picture:
     figure = figures.sphere(map_of_sphere(traces.field_ut, traces.residual, traces.axes))
-    figure.plot.update_layout(height=HEIGHTS["sphere"], dragmode=False)
-    return _sent(figure, view, {})
+    return _sent(figure, view, {}, height=HEIGHTS["sphere"], dragmode=False)
 
 
-def _sent(figure: figures.Figure, view: View, samples: dict[int, np.ndarray]) -> Picture:
-    """The figure as it goes to the page, which is as wide as it happens to be and keeps its zoom."""
-    plot = figure.on(view.dark).plot
-    samples = {number: _thinned(plot.data[number], at) for number, at in samples.items()}
-    plot.update_layout(autosize=True, uirevision="kept", newselection={"line": {"width": 1.5, "dash": "dot"}})
+def _sent(figure: figures.Figure, view: View, samples: dict[int, np.ndarray], **layout: Any) -> Picture:
+    """The figure as it goes to the page, which is as wide as it happens to be and keeps its zoom.
+
+    Plain values from here on: plotly would check them all again.
+    """
+    plot = figure.plot.to_plotly_json()
+    plot["layout"] |= {"template": TEMPLATES[view.dark], "autosize": True, "uirevision": "kept"} | layout
+    plot["layout"]["newselection"] = {"line": {"width": 1.5, "dash": "dot"}}
     if samples:
-        plot.update_layout(dragmode="select")
-        plot.update_traces(
-            selected={"marker": {"opacity": 1.0, "color": CHOSEN, "size": 6}},
-            unselected={"marker": {"opacity": 0.25}},
-            selector={"mode": "markers"},
-        )
-    return Picture(plot.to_plotly_json() | {"config": figures.CONFIG}, figure.title, figure.sentence, samples)
-
-
-def _thinned(trace: Any, samples: np.ndarray) -> np.ndarray:
-    """Fewer dots, the largest kept: a browser redraws each of them at every click. Their samples."""
-    if samples.size <= DOTS:
-        return samples
-    size = np.abs(np.asarray(trace.y, float))
-    giants = np.argpartition(size, size.size - DOTS // GIANT)[size.size - DOTS // GIANT :]
-    even = (np.arange(DOTS) * (size.size / DOTS)).astype(int)
-    at = np.union1d(even, giants)
-    trace.x, trace.y = np.asarray(trace.x)[at], np.asarray(trace.y)[at]
-    if trace.customdata is not None:
-        trace.customdata = np.asarray(trace.customdata)[at]
-    return samples[at]
+        plot["layout"]["dragmode"] = "select"
+    for number in samples:
+        trace = plot["data"][number]
+        trace.pop("customdata", None)
+        trace["selected"] = {"marker": {"opacity": 1.0, "color": CHOSEN, "size": 6}}
+        trace["unselected"] = {"marker": {"opacity": 0.25}}
+    return Picture(plot | {"config": figures.CONFIG}, figure.title, figure.sentence, samples)
 
 
 def choose(traces: Traces, box: Box, drawn: dict[str, Picture]) -> Chosen:

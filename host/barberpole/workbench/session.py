@@ -16,8 +16,8 @@ from barberpole.modelfile import ModelFile
 from barberpole.workbench.bench import START, Bench
 from barberpole.workbench.guard import below
 from barberpole.workbench.history import History, Step
+from barberpole.workbench.lab import Kept, Summary, without_effect
 from barberpole.workbench.lab import Opened as LogOpened
-from barberpole.workbench.lab import Summary, without_effect
 from barberpole.workbench.own import Tried, with_plugin
 from barberpole.workbench.pictures import Box, Chosen, Picture, View
 from barberpole.workbench.rivals import Comparison
@@ -26,6 +26,7 @@ from barberpole.workbench.worker import Stopped, Worker
 
 TRIAL_S = 20.0  # for a user's own effect to show that it keeps its contract
 HEAD_START_S = 0.3  # for the pictures, which are waited for
+DRAWN = 48  # pictures that a walk along the path finds again
 PATIENCE_S = 1.0  # an overtaken diagnosis that has run longer than this is stopped; a shorter one soon ends by itself
 
 Change = Callable[[str], None]
@@ -43,7 +44,6 @@ class Session:
     opened: LogOpened | None = None
     summary: Summary | None = None
     suspicion: Suspicion | None = None
-    abscissae: dict[str, str] = field(default_factory=dict)
     busy: str = ""
     thinking: bool = False
     message: str = ""
@@ -55,6 +55,8 @@ class Session:
 
     def __post_init__(self) -> None:
         self._judged: dict[str, Suspicion] = {}
+        self._fitted: dict[str, Summary] = {}
+        self._drawn = Kept(DRAWN)
         self._thought: asyncio.Task | None = None
         self._since = 0.0
         self.hands.start()
@@ -92,25 +94,28 @@ class Session:
         if opened is None:
             return False
         self.history, self.opened, self.suspicion = History.begin(bench), opened, None
-        self.summary, self._judged = None, {}
+        self.summary, self._judged, self._fitted, self._drawn = None, {}, {}, Kept(DRAWN)
         self.on_change("log")
         await self.refresh()
         return True
 
     async def refresh(self) -> None:
-        """Fit what is on the bench, say so, and judge it in the background."""
+        """Fit what is on the bench, say so, and judge it in the background. What is known is not computed again."""
         bench = self.bench
-        self.suspicion = self._judged.get(bench.key)
+        key = bench.key
+        self.suspicion = self._judged.get(key)
         self.on_change("history")
-        summary = await self._try("fitting", self.hands.ask("summary", bench, tick=self._tick))
+        summary = self._fitted.get(key)
+        if summary is None:
+            summary = await self._try("fitting", self.hands.ask("summary", bench, tick=self._tick))
         if bench != self.bench:
             return  # something newer is on the bench by now
         self.summary = summary
         if summary is None:
             self.on_change("fit")
             return
+        self._fitted[key] = summary
         self.history = self.path.measured(summary.rms_lsb, summary.heldout_lsb)
-        self.abscissae = await self.hands.ask("abscissae", bench)
         self.on_change("fit")
         self._judge(bench)
 
@@ -160,8 +165,10 @@ class Session:
     async def _add(self, effect: str, settings: dict | None) -> None:
         task = self.hands.ask("with_effect", self.bench, effect, settings)
         bench = await self._try(f"putting {effect} in", task)
-        if bench is not None:
-            await self.do(f"+ {effect}", bench)
+        if bench is None:
+            self.on_change("history")  # its switch goes back
+            return
+        await self.do(f"+ {effect}", bench)
 
     async def exclude(self, box: Box) -> None:
         """Leave the rows within a box out."""
@@ -189,14 +196,21 @@ class Session:
             self.history = there
             await self.refresh()
 
-    async def pictures(self, view: View, wanted: tuple[str, ...]) -> dict[str, Picture]:
-        """Pictures of what is on the bench; none where it could not be fitted."""
-        found = await self._try("drawing", self.hands.ask("picture", self.bench, view, wanted))
-        return found or {}
+    async def picture(self, view: View, name: str) -> Picture | None:
+        """A picture of what is on the bench; None where it could not be drawn, or something newer is there by now."""
+        bench = self.bench
+        key = (bench.key, name, view.of(name))
+        if key not in self._drawn:
+            found = await self._try("drawing", self.hands.ask("picture", bench, view, name))
+            if found is None:
+                return None
+            self._drawn[key] = found
+        found = self._drawn.get_or(key, lambda: None)
+        return found if self.history is not None and bench == self.bench else None
 
-    async def select(self, box: Box) -> Chosen | None:
+    async def select(self, box: Box, view: View) -> Chosen | None:
         """Samples within a box."""
-        return await self._try("selecting", self.hands.ask("select", self.bench, box))
+        return await self._try("selecting", self.hands.ask("select", self.bench, box, view))
 
     async def write_effect(self, name: str, text: str) -> tuple[Tried | None, str]:
         """Try a user's own effect and, where it keeps its contract, let it join the suspects; or say what is wrong.

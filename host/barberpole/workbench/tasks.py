@@ -1,6 +1,6 @@
 """What a worker can be asked: one function for each, (lab, arguments) -> a small answer."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from barberpole.workbench.bench import Bench
 from barberpole.workbench.keeping import build_firmware, save_calibration, save_model, save_report
 from barberpole.workbench.lab import Lab, Opened, Summary
 from barberpole.workbench.own import try_effect
-from barberpole.workbench.pictures import Box, Chosen, Picture, View, choose, draw
+from barberpole.workbench.pictures import CHOOSABLE, Box, Chosen, Picture, View, choose
 from barberpole.workbench.rivals import rivals
 from barberpole.workbench.suspects import Suspicion, suspicion
 from barberpole.workbench.traces import inside
@@ -28,21 +28,14 @@ def summary(lab: Lab, bench: Bench) -> Summary:
     return lab.summary(bench)
 
 
-def picture(lab: Lab, bench: Bench, view: View, wanted: Sequence[str]) -> dict[str, Picture]:
-    """Pictures of a fit, by name."""
-    made = draw(lab.traces(bench), view, wanted)
-    lab.drawn.update(made)
-    return {name: replace(one, samples={}) for name, one in made.items()}
+def picture(lab: Lab, bench: Bench, view: View, name: str) -> Picture:
+    """A picture of a fit."""
+    return replace(lab.picture(bench, view, name), samples={})
 
 
-def abscissae(lab: Lab, bench: Bench) -> dict[str, str]:
-    """What the residual may be drawn against: name -> title with unit."""
-    return {a.name: a.title for a in lab.traces(bench).abscissae.values()}
-
-
-def select(lab: Lab, bench: Bench, box: Box) -> Chosen:
+def select(lab: Lab, bench: Bench, box: Box, view: View) -> Chosen:
     """Samples within a box drawn in a picture."""
-    return choose(lab.traces(bench), box, lab.drawn)
+    return choose(lab.traces(bench), box, {name: lab.picture(bench, view, name) for name in CHOOSABLE})
 
 
 def exclude(lab: Lab, bench: Bench, box: Box) -> Bench:
@@ -68,6 +61,6 @@ def truth(lab: Lab, folder: Path, opened: game.Opened) -> list[float]:
     return game.fall(folder, opened)
 
 
-BENCH = (open_log, summary, abscissae, picture, select, exclude, suspects, with_effect, rivals, try_effect, truth)
+BENCH = (open_log, summary, picture, select, exclude, suspects, with_effect, rivals, try_effect, truth)
 KEEP = (save_model, save_calibration, save_report, build_firmware)
 TASKS: dict[str, Callable[..., Any]] = {task.__name__: task for task in (*BENCH, *KEEP)}

@@ -23,6 +23,11 @@ def text_of(text: str, tag: str = "span", classes: str = "") -> ui.label:
     return made
 
 
+def sentence(text: str) -> str:
+    """With a capital letter, as a sentence of its own."""
+    return text[:1].upper() + text[1:]
+
+
 def complain(sentence: str) -> None:
     """One clear message, until it is read."""
     ui.notify(sentence, type="negative", multi_line=True, close_button="OK", timeout=0, position="top")
