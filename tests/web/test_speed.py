@@ -14,7 +14,7 @@ CLICK_TO_PICTURE = """
 })
 """
 IDLE = ".bp-suspects[data-thinking=no]"
-TURNS = 5
+WAYS = (("", ""), ("rate of the ", " a sample"))
 SHARED = 2.0  # times the limit: the machine that measures has others on it
 
 
@@ -48,15 +48,17 @@ def open_named(window, name):
 
 
 def clicks_ms(window, *buttons):
-    """Median time of clicks on buttons in turn."""
-    return float(np.median([window.evaluate(CLICK_TO_PICTURE, [b, PICTURE]) for _ in range(TURNS) for b in buttons]))
+    """Median time of clicks on buttons, each once: what was drawn before is kept."""
+    return float(np.median([window.evaluate(CLICK_TO_PICTURE, [b, PICTURE]) for b in buttons]))
 
 
 @pytest.mark.bench
 @pytest.mark.parametrize(("n", "wanted_s"), [(5_000, 0.5), (100_000, 3.0), (1_000_000, 10.0)])
 def test_from_a_click_to_the_new_picture(window, long_log, n, wanted_s):
     open_named(window, long_log(n))
-    against = clicks_ms(window, "[title='temperature, °C']", "[title='the x field, µT']") / 1e3
+    against = (
+        clicks_ms(window, *(f"[title='the {way}{axis} field, µT{unit}']" for way, unit in WAYS for axis in "xyz")) / 1e3
+    )
     added = window.evaluate(CLICK_TO_PICTURE, ["button[aria-label='Add sensitivity_temperature']", PICTURE]) / 1e3
     window.wait_for_selector(IDLE)
     back = window.evaluate(CLICK_TO_PICTURE, [".bp-step", PICTURE]) / 1e3
