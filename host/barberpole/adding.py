@@ -10,6 +10,7 @@ from barberpole.diagnose.evidence import examine, unsure_of_noise
 from barberpole.diagnose.search import attempt, doubtful_readings, forms_tried, giant_readings
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect, find_effect
+from barberpole.fit.easy_axes import with_easy_axes
 from barberpole.fit.fit import Fit, fit_observations, require_columns
 from barberpole.modelfile import ModelFile
 from barberpole.observations import Observations
@@ -68,6 +69,7 @@ def change(
     An effect that is added may take several forms (a frequency, a period, a time constant to be searched); where the
     model file does not settle that, the form that gains most is taken.
     """
+    seen = with_easy_axes(seen)
     old = fit_observations(seen, before, extra, tick)
     require_columns(seen, after.effects, extra)
     adding = effect in after.effects

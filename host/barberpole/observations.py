@@ -22,6 +22,7 @@ class Observations:
     reference   "vector", "magnitude" or "constant": what is known of the field
     raw_polarity    RESET readings came raw and were turned here, so the bridge's own offset alternates in y
     notes       what was decided on the way, in sentences
+    sensor_known    a sensor file gave the easy axes
     """
 
     y: np.ndarray
@@ -32,10 +33,12 @@ class Observations:
     reference: str
     raw_polarity: bool
     notes: tuple[str, ...] = ()
+    sensor_known: bool = False
 
 
 def observations(log: Log, sensor: Sensor | None = None, raw: bool | None = None) -> Observations:
-    """The log as a fit sees it. `sensor` gives the easy axes; without it those of Conditions hold (thesis 5.3.2).
+    """The log as a fit sees it. `sensor` gives the easy axes; without it those of Conditions hold (thesis 5.3.2) unless
+    the log shows others (`fit.easy_axes`).
 
     raw: whether RESET readings have the reversed sign, where that is known; else the log says or its data decide.
     """
@@ -49,7 +52,7 @@ def observations(log: Log, sensor: Sensor | None = None, raw: bool | None = None
     b_ut, b_mag = _repeated(log.stack(FIELD), repeat), _repeated(log.get("b_ut"), repeat)
     notes = ("RESET readings come with reversed sign: turned",) if raw else ()
     row = np.repeat(np.arange(log.n), repeat)
-    return Observations(y, at, b_ut, b_mag, row, _reference(b_ut, b_mag), raw, notes)
+    return Observations(y, at, b_ut, b_mag, row, _reference(b_ut, b_mag), raw, notes, sensor is not None)
 
 
 def _pairs(log: Log, known: bool | None) -> tuple[np.ndarray, np.ndarray, bool]:

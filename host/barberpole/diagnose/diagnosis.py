@@ -18,6 +18,7 @@ from barberpole.diagnose.visibility import unseen, visibility
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import InputError
+from barberpole.fit.easy_axes import with_easy_axes
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.fit.noise import Noise
 from barberpole.log import Log
@@ -58,6 +59,7 @@ def diagnose_observations(
     at_rest = still(seen)
     if at_rest is not None:
         return at_rest_answer(seen, at_rest)
+    seen = with_easy_axes(seen)
     try:
         fit = fit_observations(_about_its_temperature(seen), file, extra)
     except InputError as error:

@@ -10,6 +10,7 @@ from barberpole.effects import Effect, Setup, find_effect
 from barberpole.errors import InputError, must
 from barberpole.fit import observability
 from barberpole.fit.affine import moments
+from barberpole.fit.easy_axes import with_easy_axes
 from barberpole.fit.gram import Gram, Tick, heldout_rms
 from barberpole.fit.honest import factors
 from barberpole.fit.residual import Problem
@@ -121,7 +122,7 @@ def fit_log(log: Log, file: ModelFile, extra: Sequence[Effect] = (), tick: Calla
 def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect] = (), tick=None) -> Fit:
     """Fit the effects of a model file to observations. Raises InputError where a column that it needs is not there."""
     require_columns(seen, file.effects, extra)
-    seen = with_reference(seen, file)
+    seen = with_reference(with_easy_axes(seen) if "cross_field" in file.effects else seen, file)
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     taken = None if seen.b_ut is None else moments(seen.y, seen.b_ut)
     linear = linear_part(seen, magnitude, taken)
