@@ -1,4 +1,4 @@
-"""requirements.lock: everything that pyproject.toml asks for, pinned, with hashes, and no place to fetch it from."""
+"""host/requirements.lock: everything that pyproject.toml asks for, pinned, with hashes, and no place to fetch it from."""
 
 import re
 import tomllib
@@ -14,7 +14,7 @@ LOCKED = ("twin", "fleet", "test")  # the peers of the benchmark are no part of 
 @pytest.fixture(scope="module")
 def pinned():
     """Name -> version and number of hashes."""
-    text = (REPOSITORY / "requirements.lock").read_text().replace("\\\n", " ")
+    text = (REPOSITORY / "host" / "requirements.lock").read_text().replace("\\\n", " ")
     found = {}
     for line in text.splitlines():
         if line.strip() and not line.startswith("#"):
@@ -41,5 +41,5 @@ def test_every_pin_has_hashes(pinned):
 
 
 def test_no_address_is_in_it():
-    text = (REPOSITORY / "requirements.lock").read_text()
+    text = (REPOSITORY / "host" / "requirements.lock").read_text()
     assert re.findall(r"://|--(?:extra-)?index|--find-links|--trusted-host", text) == []

@@ -40,7 +40,7 @@ def place(tmp_path_factory):
 def _needed(folder):
     """The lock file without what only the tests and fleets need."""
     without = ("pytest", "hypothesis", "ruff", "pyright", "sympy", "playwright", "dask", "distributed", "nodejs")
-    parts = (REPOSITORY / "requirements.lock").read_text().replace("\\\n", "\\\0").splitlines()
+    parts = (REPOSITORY / "host" / "requirements.lock").read_text().replace("\\\n", "\\\0").splitlines()
     kept = [part.replace("\\\0", "\\\n") for part in parts if not part.startswith(without)]
     (folder / "lock.txt").write_text("\n".join(kept) + "\n")
     return folder / "lock.txt"
