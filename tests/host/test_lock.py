@@ -1,4 +1,4 @@
-"""host/requirements.lock: everything that pyproject.toml asks for, pinned, with hashes, and no place to fetch it from."""
+"""host/requirements.lock: all that pyproject.toml asks for, pinned, with hashes, and no place to fetch it from."""
 
 import re
 import tomllib
