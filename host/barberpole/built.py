@@ -1,5 +1,7 @@
 """What `barberpole build` left in a folder: read and checked once, here, for whoever puts it on a board."""
 
+import contextlib
+import glob
 import hashlib
 import json
 from collections.abc import Mapping
@@ -12,6 +14,8 @@ from barberpole.files import read_bytes, read_text
 from barberpole.mpy import ARCHITECTURES, compile_module
 
 LISTING = "build.json"
+OLD = ".old-"
+"""A former build that is moved aside is called by its name and this."""
 MAIN = "main.py"
 NATIVE_FOR = (7, 8)
 """Architectures (bits 10 to 13 of sys.implementation._mpy) that run a build's native code: armv7emsp and armv7emdp."""
@@ -39,8 +43,21 @@ class Built:
         return {target: sha256(data) for target, data in self.files.items()}
 
 
+def recover(folder: Path) -> None:
+    """Put the former build back to its place, where a build was killed after it had moved it aside."""
+    folder = folder.resolve()
+    if folder.exists():
+        return
+    former = [(path.stat().st_mtime, path) for path in folder.parent.glob(f"{glob.escape(folder.name)}{OLD}*")]
+    for _, path in sorted(former, reverse=True):
+        with contextlib.suppress(OSError):  # somebody else was quicker
+            path.rename(folder)
+            return
+
+
 def read_built(folder: Path) -> Built:
     """Read a build folder. Raises InputError where it is none or a file is not what was built."""
+    recover(folder)
     listing = folder / LISTING
     if not listing.exists():
         raise InputError(must("the build", "a folder made by `barberpole build`", f"no {LISTING}", folder))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from barberpole.errors import InputError, must
 
-FULL = (errno.ENOSPC, errno.EDQUOT)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_atomic(path: str | Path, content: bytes | str) -> None:
@@ -17,6 +17,7 @@ def write_atomic(path: str | Path, content: bytes | str) -> None:
     Raises InputError when the folder is absent or cannot be written; nothing is left behind then.
     """
     path = Path(path)
+    require_file(path)
     data = content.encode() if isinstance(content, str) else content
     beside = path.with_name(f"{path.name}.tmp-{os.getpid()}-{secrets.token_hex(4)}")  # threads write too
     try:
@@ -24,11 +25,22 @@ def write_atomic(path: str | Path, content: bytes | str) -> None:
         beside.replace(path)
     except OSError as error:
         _remove(beside)
-        wanted = "on a disk with room" if error.errno in FULL else "in a folder that can be written"
-        raise InputError(must("the output file", wanted, error.strerror, path)) from None
+        raise cannot_write("the output file", error, path) from None
     except BaseException:  # Ctrl-C among them
         _remove(beside)
         raise
+
+
+def require_file(path: Path) -> None:
+    """Raise InputError where an output file is named like a folder that is there."""
+    if not path.name or path.is_dir():
+        raise InputError(must("the output file", "a file", "a folder", path))
+
+
+def cannot_write(what: str, error: OSError, where: object) -> InputError:
+    """The one sentence about an output that the system refused: a full disk is said to be one."""
+    wanted = "on a disk with room" if error.errno in FULL else "in a folder that can be written"
+    return InputError(must(what, wanted, error.strerror or error, where))
 
 
 def _remove(beside: Path) -> None:
