@@ -90,16 +90,21 @@ class Model:
     def rest(self) -> tuple[Term, ...]:
         return self.terms[len(self.head) :]
 
-    @property
+    @cached_property
     def null(self) -> Array:
         return np.array([p.null for p in self.params])
 
-    @property
+    @cached_property
     def first(self) -> Array:
         return np.array([p.first for p in self.params])
 
-    def bounds(self) -> tuple[Array, Array]:
+    @cached_property
+    def _bounds(self) -> tuple[Array, Array]:
         return np.array([p.lower for p in self.params]), np.array([p.upper for p in self.params])
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper, (P,) each."""
+        return self._bounds
 
     def states(self, at: Conditions) -> list[tuple[float, Conditions]]:
         """The magnetisations to evaluate, with their weights: a demodulated reading is the mean of SET and RESET."""

@@ -47,12 +47,14 @@ STACK: tuple[Effect, ...] = (
     ADC_INL,
     OUTLIERS,
 )
+BY_NAME = {effect.name: effect for effect in STACK}
+BRIDGE = list(BY_NAME).index(CROSS_FIELD.name)  # effects before it are on the field
 ALIASES = {"hard_iron": "bias"}  # nothing in a log separates the two: the field of a magnet, seen through the gain
 
 
 def find_effect(name: str, extra: Sequence[Effect] = ()) -> Effect:
     """The effect of that name or alias. Raises InputError with the known names."""
-    known = {e.name: e for e in (*STACK, *extra)}
+    known = BY_NAME | {e.name: e for e in extra} if extra else BY_NAME
     wanted = ALIASES.get(name, name)
     if wanted not in known:
         raise InputError(must("effect", f"one of {', '.join(known)}", repr(name)))
@@ -72,10 +74,9 @@ def listed_as(name: str, names: Sequence[str]) -> str:
 
 def in_order(extra: Sequence[Effect] = ()) -> tuple[Effect, ...]:
     """STACK with a user's effects in their place: those on the field before the bridge, those on readings last."""
-    bridge = STACK.index(CROSS_FIELD)
     field = tuple(e for e in extra if e.stage == "field")
     reading = tuple(e for e in extra if e.stage != "field")
-    return (*STACK[:bridge], *field, *STACK[bridge:], *reading)
+    return (*STACK[:BRIDGE], *field, *STACK[BRIDGE:], *reading)
 
 
 __all__ = [

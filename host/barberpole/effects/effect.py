@@ -9,6 +9,7 @@ Effects before `scale` in the stack work on µT, `scale` and those after it on L
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -220,6 +221,7 @@ class Effect:
         return np.imag(np.broadcast_to(np.asarray(self.forward(xyz, p, at)), np.shape(xyz)))
 
 
+@lru_cache(maxsize=256)
 def per_axis(unit: str, null: float = 0.0, prefix: str = "", **limits: Any) -> tuple[Param, ...]:
     """Three parameters of one kind, named for the axes."""
     return tuple(Param(f"{prefix}{axis}", unit, null, **limits) for axis in "xyz")

@@ -14,19 +14,19 @@ from barberpole.effects.effect import Conditions, Effect, Param, Setup
 UPPER = ("xy", "xz", "yz")
 LOWER = ("yx", "zx", "zy")
 PLACES = tuple(("xyz".index(i), "xyz".index(j)) for i, j in UPPER + LOWER)
-_ANGLE = {"unit": "rad", "typical": 0.02, "lower": -20.0, "upper": 20.0}
+ROWS, COLUMNS = np.array(PLACES).T
+ANGLES = tuple(Param(name, unit="rad", typical=0.02, lower=-20.0, upper=20.0) for name in UPPER + LOWER)
 
 
 def params(setup: Setup):
     """The e_ij that this reference can determine, in rad (tangents)."""
-    return tuple(Param(name, **_ANGLE) for name in (UPPER + LOWER if setup.reference == "vector" else UPPER))
+    return ANGLES if setup.reference == "vector" else ANGLES[: len(UPPER)]
 
 
 def matrix(p):
     """The rows of (1), 3 x 3, unit norm."""
     rows = np.eye(3, dtype=np.result_type(np.asarray(p), float))
-    for (i, j), value in zip(PLACES, p, strict=False):
-        rows[i, j] = value
+    rows[ROWS[: len(p)], COLUMNS[: len(p)]] = p
     return rows / np.sqrt(np.sum(rows * rows, axis=1))[:, None]
 
 
@@ -46,8 +46,9 @@ def joint(xyz, p, at: Conditions):
     unit, field = matrix(p), np.asarray(xyz)
     out = unit @ field
     d_p = np.zeros((3, len(p), field.shape[1]))
-    for column, (i, j) in enumerate(PLACES[: len(p)]):
-        d_p[i, column] = unit[i, i] * (field[j] - unit[i, j] * out[i])  # d (row / |row|) / d e_ij
+    column = np.arange(len(p))
+    i, j = ROWS[column], COLUMNS[column]
+    d_p[i, column] = unit[i, i, None] * (field[j] - unit[i, j, None] * out[i])  # d (row / |row|) / d e_ij
     return out, unit[:, :, None], d_p
 
 

@@ -9,7 +9,6 @@ derivatives come from the model itself, evaluated at four fields.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,15 +18,17 @@ from barberpole.model import Model
 
 SPAN_UT = 50.0  # between the four fields; any will do
 FIELDS = np.hstack([np.zeros((3, 1)), SPAN_UT * np.eye(3)])
+NEVER = 1e-9  # of the largest moment: a direction that the field never took
 FEW = 200  # samples of the rough fit
 CHUNK_SURFACE = 4096  # as long as the chunks of a problem
-CHUNK = 16384  # samples at a time: seven rows of them stay in the cache
+TOGETHER = 8  # neighbours that are added up to look at what is slow
+CHUNK = 6000  # samples at a time: eight rows of them stay in the cache
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Of readings y (3, n) against fields b (3, n): `about` is C_0 (3, 4); by block zz (B, 4, 4), zr (B, 4, 3), rr (B,)
-    and the number of residuals m (B,)."""
+    """Of readings y (3, n) against fields b (3, n): `about` is C_0 (3, 4); by block zz (B, 4, 4), zr (B, 4, 3), rr
+    (B, 3) and the number of residuals m (B,)."""
 
     y: np.ndarray
     b: np.ndarray
@@ -39,33 +40,56 @@ class Moments:
 
     def best(self) -> np.ndarray:
         """C (3, 4) of least squares. Directions that the field never took are left out, for observability to name."""
-        return self.about + self.zr.sum(axis=0).T @ np.linalg.pinv(self.zz.sum(axis=0), rcond=1e-9, hermitian=True)
+        size, directions = np.linalg.eigh(self.zz.sum(axis=0))
+        taken = directions[:, size > NEVER * size[-1]]
+        inverse = (taken / size[size > NEVER * size[-1]]) @ taken.T
+        return self.about + self.zr.sum(axis=0).T @ inverse
+
+    def spans(self, part: float) -> bool:
+        """Whether the field's smallest extent is at least `part` of its largest."""
+        zz = self.zz.sum(axis=0)
+        n, mean = zz[0, 0], zz[0, 1:] / zz[0, 0]
+        extent = np.linalg.eigvalsh(zz[1:, 1:] / n - np.outer(mean, mean))
+        return bool(n > 3 and extent[0] > part**2 * extent[2])
 
     def gram(self, value: np.ndarray, slopes: np.ndarray) -> Gram:
         """Normal equations at C = value (3, 4) with d C / d p = slopes (3, 4, P), by (2)."""
-        apart, zz = (value - self.about).T, self.zz[:, None]
+        apart, by_p = (value - self.about).T, slopes.reshape(12, -1)
         left = self.zr - self.zz @ apart  # z r, (B, 4, 3)
-        jj = np.sum(slopes.transpose(0, 2, 1) @ (zz @ slopes), axis=1)
-        jr = left.transpose(0, 2, 1).reshape(BLOCKS, 12) @ slopes.reshape(12, -1)
-        rr = self.rr - np.sum((self.zr + left) * apart, axis=(1, 2))
+        jj = by_p.T @ (self.zz[:, None] @ slopes).reshape(BLOCKS, 12, -1)
+        jr = left.transpose(0, 2, 1).reshape(BLOCKS, 12) @ by_p
+        rr = np.sum(self.rr - np.sum((self.zr + left) * apart, axis=1), axis=1)
         return Gram(jj, jr, np.maximum(rr, 0.0), self.m)
+
+    def squares(self, value: np.ndarray) -> np.ndarray:
+        """Sum of the squared residuals of each channel (3,) at C = value (3, 4)."""
+        apart, zr = (value - self.about).T, self.zr.sum(axis=0)
+        left = zr - self.zz.sum(axis=0) @ apart
+        return self.rr.sum(axis=0) - np.sum((zr + left) * apart, axis=0)
 
 
 def moments(y: np.ndarray, b: np.ndarray) -> Moments:
     """One pass over readings (3, n) in LSB and fields (3, n) in µT."""
     n = y.shape[1]
     about = _rough(y[:, :: max(n // FEW, 1)], b[:, :: max(n // FEW, 1)])
-    edges, rows = block_edges(n), np.ones((7, min(n, CHUNK)))  # z and r
-    sums = np.zeros((BLOCKS, 7, 7))
-    for block, (first, last) in enumerate(pairwise(edges.tolist())):
-        for at in range(first, last, CHUNK):
-            stop = min(at + CHUNK, last)
-            part = rows[:, : stop - at]
-            part[1:4] = b[:, at:stop]
-            np.subtract(y[:, at:stop], about @ part[:4], out=part[4:])
-            sums[block] += part @ part.T
-    rr = np.trace(sums[:, 4:, 4:], axis1=1, axis2=2)
-    return Moments(y, b, about, sums[:, :4, :4], sums[:, :4, 4:], rr, 3.0 * np.diff(edges))
+    edges, rows = block_edges(n), np.ones((8, min(n, CHUNK)))  # z, r and a null, as products of eight rows are faster
+    rows[7], sums = 0.0, np.zeros((BLOCKS, 8, 8))
+    for at in range(0, n, CHUNK):
+        chunk = slice(at, min(at + CHUNK, n))
+        part = rows[:, : chunk.stop - at]
+        part[1:4] = b[:, chunk]
+        np.subtract(y[:, chunk], about @ part[:4], out=part[4:7])
+        for block, of_chunk in pieces(edges, 0, chunk):
+            piece = part[:, of_chunk]
+            sums[block] += piece @ piece.T
+    rr = sums.diagonal(axis1=1, axis2=2)[:, 4:7]
+    return Moments(y, b, about, sums[:, :4, :4], sums[:, :4, 4:7], rr, 3.0 * np.diff(edges))
+
+
+def neighbours(channels: np.ndarray) -> np.ndarray:
+    """Channels (m, n) with TOGETHER neighbours added up, (m, n // TOGETHER): white where they are, and as slow."""
+    whole = channels.shape[1] - channels.shape[1] % TOGETHER
+    return channels[:, :whole].reshape(len(channels), -1, TOGETHER) @ np.ones(TOGETHER)
 
 
 def _rough(y: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -86,10 +110,29 @@ def coefficients(model: Model, p: np.ndarray, at: Conditions) -> tuple[np.ndarra
     return _about_origin(y), _about_origin(by_p.transpose(0, 2, 1))
 
 
+def constants(model: Model, p: np.ndarray, at: Conditions) -> np.ndarray:
+    """C (3, 4) alone."""
+    return _about_origin(model.predict(FIELDS, p, Conditions(gain=at.gain)))
+
+
 def _about_origin(at_fields: np.ndarray) -> np.ndarray:
     out = (at_fields - at_fields[:, :1]) / SPAN_UT
     out[:, 0] = at_fields[:, 0]
     return out
+
+
+def residual(problem, p: np.ndarray) -> np.ndarray:
+    """All residuals (m, n) in LSB of a problem to which (1) applies, in one product."""
+    value, seen = constants(problem.model, p, problem.seen.at), problem.seen
+    if seen.b_ut is not None:
+        return seen.y - (value[:, 1:] @ seen.b_ut + value[:, :1])
+    inverse = np.linalg.inv(value[:, 1:])
+    field = inverse @ seen.y
+    field -= inverse @ value[:, :1]
+    size = np.sqrt(np.einsum("ik,ik->k", field, field))
+    steep = (inverse @ inverse.T) @ field
+    steep = np.einsum("ik,ik->k", field, steep)
+    return ((size - problem.magnitude(slice(None))) * size / np.sqrt(steep))[None]
 
 
 def add_surface(gram: Gram, problem, p: np.ndarray, edges: np.ndarray, before: int, tick: Tick = None) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from barberpole.errors import InputError
 
-CHUNK = 8192  # samples at a time
+CHUNK = 4096  # samples at a time
 MIN_SAMPLES = 12  # nine unknowns, and something left to judge them by
 
 

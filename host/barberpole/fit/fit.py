@@ -126,7 +126,7 @@ def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect
     magnitude = float(file.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     taken = None if seen.b_ut is None else moments(seen.y, seen.b_ut)
     linear = linear_part(seen, magnitude, taken)
-    require_usable(seen, linear, magnitude)
+    require_usable(seen, linear, magnitude, taken)
     setup = setup_of(seen, linear)
     known = {find_effect(n, extra).name: replace(setup, settings=file.settings.get(n, {})) for n in file.effects}
     model = compose(file.effects, known, extra)
@@ -228,8 +228,8 @@ def fit_problem(
         solution = determined(problem, solution.p, solution.free, tick)
     if not problem.vector and problem.thinnest < THIN * solution.gram.rms():
         raise InputError(no_surface(problem.seen.y))
-    cov = observability.covariance(solution.gram, solution.free)
-    return Fit(problem, solution.p, cov, solution.gram, solution.free, solution.converged, linear, known, extra, held)
+    s = solution
+    return Fit(problem, s.p, s.covariance, s.gram, s.free, s.converged, linear, known, extra, held)
 
 
 def believable(residual: np.ndarray, limit: float = OUTLIER) -> np.ndarray:
@@ -240,8 +240,11 @@ def believable(residual: np.ndarray, limit: float = OUTLIER) -> np.ndarray:
 
 def _freeze_undetermined(model: Model, solution: Solution, keep: np.ndarray) -> None:
     """Take parameters out of the mask `keep`, the worst first, until all are determined."""
-    while (worst := observability.undetermined(model, solution.gram, keep, solution.p)) is not None:
+    same = bool(np.array_equal(keep, solution.free))
+    covariance = solution.covariance if same else observability.covariance(solution.gram, keep)
+    while (worst := observability.undetermined(model, covariance, keep, solution.p)) is not None:
         keep[worst] = False
+        covariance = observability.covariance(solution.gram, keep)
 
 
 def determined(problem: Measured, p: np.ndarray, free: np.ndarray, tick: Tick = None) -> Solution:
@@ -249,10 +252,12 @@ def determined(problem: Measured, p: np.ndarray, free: np.ndarray, tick: Tick = 
     null = problem.model.null
     # a singular start leads a fit astray
     first = problem.gram(p, 0.0, tick)
-    free = free & ~observability.dependent(problem.model, first, free)
+    kept = observability.independent(problem.model, first, free)
+    free = free & (kept | observability.absent(first))
     while True:
         solution = minimise(problem, p, free, first, tick)
-        keep = observability.independent(problem.model, solution.gram, free)
+        moved = solution.gram is not first
+        keep = observability.independent(problem.model, solution.gram, free) if moved else kept & free
         if solution.converged:  # the covariance says nothing of a fit that went astray
             _freeze_undetermined(problem.model, solution, keep)
         if np.array_equal(keep, free):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 BLOCKS = 10  # contiguous, so that a held-out stretch is really unseen; folds leave out two of them at a time
 FOLDS = 5
@@ -139,7 +140,9 @@ def solve_scaled(h: np.ndarray, g: np.ndarray, damping: float = 0.0) -> np.ndarr
     """x of (H + damping diag H) x = g with the columns brought to unit size first. Raises LinAlgError if singular."""
     size = np.sqrt(np.diag(h))
     size = np.where(size > 0, size, 1.0)
-    scaled = h / np.outer(size, size)
-    scaled[np.diag_indices_from(scaled)] += damping
-    factor = np.linalg.cholesky(scaled)
-    return np.linalg.solve(factor.T, np.linalg.solve(factor, g / size)) / size
+    scaled = h / (size[:, None] * size)
+    scaled.flat[:: size.size + 1] += damping
+    _, x, not_positive = dposv(scaled, g / size)
+    if not_positive:
+        raise np.linalg.LinAlgError("the columns do not determine the parameters")
+    return x / size

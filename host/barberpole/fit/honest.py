@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
+from barberpole.fit.affine import TOGETHER
 from barberpole.fit.noise import expected, frequencies
 from barberpole.fit.observability import BASIC
 from barberpole.fit.residual import CHUNK, Problem
+from barberpole.fit.solve import ROUNDING
 
 if TYPE_CHECKING:
     from barberpole.fit.fit import Fit
@@ -64,18 +66,20 @@ def _by_spectrum(fit: "Fit", free: np.ndarray, inverse: np.ndarray, white: np.nd
     problem = fit.problem
     if fit.whole is not None or problem.n < LEAST:
         return np.ones(free.size)
-    residual = problem.residual(fit.p)
-    if problem.believed is not None:
-        residual = residual * problem.believed
-    if not _reddened(residual):
+    summed, squares = problem.neighbours(fit.p)
+    noisy = squares > problem.n * (ROUNDING * problem.largest) ** 2  # a dead axis leaves arithmetic, not noise
+    if not noisy.any() or not _reddened(summed[noisy], squares[noisy] / problem.n):
         return np.ones(free.size)
+    residual = problem.counting(fit.p)
     normal = None if problem.vector else problem.normal(fit.p)
     first = slice(0, min(SEGMENT, problem.n))
     kept = _kept(_columns(problem, fit.p, first)[:, free], inverse)
     f = frequencies(PADDED * first.stop)
-    spectrum = expected(residual[:, first], f, kept, None if normal is None else normal[:, first])
-    if spectrum is None:
+    found = expected(residual[noisy, first], f, kept[noisy], None if normal is None else normal[:, first])
+    if found is None:
         return np.ones(free.size)
+    spectrum = np.full((noisy.size, f.size), 1e-300)
+    spectrum[noisy] = found
     middle = _in_colour(problem, fit.p, free, np.log(f), np.log(spectrum), normal)
     return np.maximum(np.einsum("ij,jk,ki->i", inverse, middle, inverse) / white, 1.0)
 
@@ -87,13 +91,12 @@ def _kept(columns: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     return np.clip(1.0 - taken, 0.0, 1.0)
 
 
-def _reddened(residual: np.ndarray) -> bool:
-    """Whether the slow part of residuals (m, n) holds more power than white noise would put there."""
-    n = residual.shape[1]
-    power = np.abs(np.fft.rfft(residual, axis=1)[:, 1:]) ** 2
-    slow = power[:, : max(n // (2 * SLOW), 1)]
-    level = np.maximum(power.mean(axis=1, keepdims=True), 1e-300)
-    return bool(np.mean(slow / level) > 1.0 + RED / np.sqrt(slow.size))
+def _reddened(summed: np.ndarray, variance: np.ndarray) -> bool:
+    """Whether the slow part of residuals holds more power than white noise would put there: given are sums of
+    neighbours (m, k), which are white where the residual is, and its variances (m,)."""
+    n = TOGETHER * summed.shape[1]
+    slow = np.abs(np.fft.rfft(summed, axis=1)[:, 1 : max(n // (2 * SLOW), 1) + 1]) ** 2
+    return bool(np.mean(slow / (n * variance[:, None])) > 1.0 + RED / np.sqrt(slow.size))
 
 
 def _in_colour(

@@ -15,11 +15,13 @@ BASIC = ("bias", "scale", "misalignment")  # what every sensor has keeps its par
 def independent(model: Model, gram: Gram, free: np.ndarray) -> np.ndarray:
     """Mask of the free parameters whose columns are not combinations of others: basic ones first, then stack order."""
     h = gram.jj.sum(axis=0)
-    size = np.sqrt(np.diag(h))
+    size = np.sqrt(h.diagonal())
     usable = free & (size > 1e-12 * max(size.max(initial=0.0), 1e-300))
     size = np.where(usable, size, 1.0)
-    left = h / np.outer(size, size)  # the columns' products once those kept so far are taken off
+    left = h / (size[:, None] * size)  # the columns' products once those kept so far are taken off
     keep = np.zeros_like(free)
+    if usable.all() and np.linalg.eigvalsh(left)[0] > RANK:
+        return usable  # no column, in any order, has less left than the smallest eigenvalue
     for j in sorted(np.flatnonzero(usable).tolist(), key=lambda j: model.names[j].split(".")[0] not in BASIC):
         if left[j, j] > RANK:
             keep[j] = True
@@ -27,31 +29,30 @@ def independent(model: Model, gram: Gram, free: np.ndarray) -> np.ndarray:
     return keep
 
 
-def dependent(model: Model, gram: Gram, free: np.ndarray) -> np.ndarray:
-    """Mask of the free parameters whose columns are there but combinations of others.
-
-    A column that is zero may come to life away from the start (a frequency whose amplitude is still null).
-    """
-    there = np.diag(gram.jj.sum(axis=0)) > 0
-    return free & there & ~independent(model, gram, free & there)
+def absent(gram: Gram) -> np.ndarray:
+    """Mask of the parameters without a column: away from the start it may come to life, as that of a frequency whose
+    amplitude is still null."""
+    return ~(gram.jj.sum(axis=0).diagonal() > 0)
 
 
 def covariance(gram: Gram, free: np.ndarray) -> np.ndarray:
     """(P, P) covariance of the parameters; rows of parameters that are not free are zero."""
-    h = gram.jj.sum(axis=0)[np.ix_(free, free)]
-    size = np.sqrt(np.diag(h))
+    h = gram.jj.sum(axis=0)[free][:, free]
+    size = np.sqrt(h.diagonal())
+    products = size[:, None] * size
     out = np.zeros((free.size, free.size))
     variance = gram.cost / max(gram.count - int(free.sum()), 1)
-    out[np.ix_(free, free)] = variance * np.linalg.inv(h / np.outer(size, size)) / np.outer(size, size)
+    out[np.ix_(free, free)] = variance * np.linalg.inv(h / products) / products
     return out
 
 
-def undetermined(model: Model, gram: Gram, free: np.ndarray, p: np.ndarray) -> int | None:
+def undetermined(model: Model, covariance: np.ndarray, free: np.ndarray, p: np.ndarray) -> int | None:
     """The free parameter least determined, if its standard error exceeds what a real sensor could show; else None.
 
-    One of p (P,) that stands clear of its null is determined, unless it is of the basic ones, which hide in each other.
+    covariance (P, P). One of p (P,) that stands clear of its null is determined, unless it is of the basic ones, which
+    hide in each other.
     """
-    stderr = np.sqrt(np.maximum(np.diag(covariance(gram, free)), 0.0))
+    stderr = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
     typical = np.array([abs(q.typical) if q.typical else np.inf for q in model.params])
     basic = np.array([name.split(".")[0] in BASIC for name in model.names], bool)
     shown = ~basic & (np.abs(p - model.null) > SHOWN * stderr)
@@ -63,6 +64,6 @@ def undetermined(model: Model, gram: Gram, free: np.ndarray, p: np.ndarray) -> i
 def condition(gram: Gram, free: np.ndarray) -> float:
     """Condition number of the free parameters' columns, each brought to unit size."""
     h = gram.jj.sum(axis=0)[np.ix_(free, free)]
-    size = np.sqrt(np.diag(h))
+    size = np.sqrt(h.diagonal())
     values = np.linalg.eigvalsh(h / np.outer(size, size))
     return float(np.sqrt(values[-1] / max(values[0], 1e-300)))

@@ -12,7 +12,9 @@ from functools import cached_property, partial
 import numpy as np
 
 from barberpole.chain import solve3
+from barberpole.fit import affine
 from barberpole.fit.affine import Moments, add_surface, coefficients, is_affine
+from barberpole.fit.few import few
 from barberpole.fit.gram import Gram, Tick, accumulate, add_samples
 from barberpole.model import Model
 from barberpole.observations import Observations
@@ -64,27 +66,47 @@ class Problem:
         """Whether every sample sees the same matrix and constant."""
         return is_affine(self.model, self.seen.at)
 
-    @property
+    @cached_property
     def largest(self) -> float:
         """The largest reading in LSB."""
         return max(float(np.max(self.seen.y, initial=0.0)), -float(np.min(self.seen.y, initial=0.0)))
 
     @cached_property
     def thinnest(self) -> float:
-        """Standard deviation of the readings where their cloud is thinnest, LSB."""
-        mean = self.seen.y.mean(axis=1)
-        spread = self.seen.y @ self.seen.y.T / self.n - np.outer(mean, mean)
-        return float(np.sqrt(max(np.linalg.eigvalsh(spread)[0], 0.0)))
+        """Standard deviation of the readings where their cloud is thinnest, LSB, of some of them."""
+        y = self.seen.y[:, few(self.n)]
+        y = y - y.mean(axis=1, keepdims=True)
+        return float(np.sqrt(max(np.linalg.eigvalsh(y @ y.T / y.shape[1])[0], 0.0)))
 
     def gram(self, p: np.ndarray, sigma: float = 0.0, tick: Tick = None) -> Gram:
         """Normal equations at parameters p: one pass over the log, or none where its moments say it all.
 
         sigma (LSB): noise of a reading, which lengthens the fitted field of a scalar reference a little.
         """
-        known = self.moments
-        if known is None or known.y is not self.seen.y or self.believed is not None or not self.affine:
+        if self._known is None:
             return accumulate(self, p, sigma, tick)
-        return known.gram(*coefficients(self.model, p, self.seen.at))
+        return self._known.gram(*coefficients(self.model, p, self.seen.at))
+
+    @cached_property
+    def _known(self) -> Moments | None:
+        """The moments, where they say all that there is."""
+        known = self.moments
+        whole = known is not None and known.y is self.seen.y and self.believed is None and self.affine
+        return known if whole else None
+
+    def neighbours(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals with eight neighbours added up (m, n // 8), and the sums of their squares (m,); what does not count
+        is null."""
+        if self._known is None:
+            residual = self.counting(p)
+            return affine.neighbours(residual), np.einsum("mn,mn->m", residual, residual)
+        value, seen = affine.constants(self.model, p, self.seen.at), self.seen
+        summed = affine.neighbours(seen.y) - value[:, 1:] @ affine.neighbours(np.asarray(seen.b_ut))
+        return summed - affine.TOGETHER * value[:, :1], self._known.squares(value)
+
+    def counting(self, p: np.ndarray) -> np.ndarray:
+        """All residuals (m, n) in LSB, null where they do not count."""
+        return self.residual(p) if self.believed is None else self.residual(p) * self.believed
 
     def add_to(self, gram: Gram, p: np.ndarray, edges: np.ndarray, before: int, tick: Tick = None) -> None:
         """Add these samples at parameters p to sums over a log in which `before` samples came before them."""
@@ -167,6 +189,8 @@ class Problem:
 
     def residual(self, p: np.ndarray) -> np.ndarray:
         """All residuals (m, n) in LSB, outliers too."""
+        if self.affine:
+            return affine.residual(self, p)
         return np.concatenate([self.residual_of(p, rows) for rows in self.chunks()], axis=1)
 
     def residual_of(self, p: np.ndarray, rows: slice) -> np.ndarray:

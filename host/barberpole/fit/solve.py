@@ -1,11 +1,13 @@
 """Bounded least squares: Levenberg-Marquardt on the block normal equations."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from barberpole.errors import InputError
+from barberpole.fit import observability
 from barberpole.fit.gram import Gram, Tick, solve_scaled
 from barberpole.model import Model
 
@@ -28,6 +30,11 @@ class Solution:
     gram: Gram
     free: np.ndarray
     converged: bool
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(P, P) in white noise."""
+        return observability.covariance(self.gram, self.free)
 
 
 class Measured(Protocol):
@@ -109,7 +116,7 @@ def _step(gram: Gram, movable: np.ndarray, damping: float) -> tuple[np.ndarray, 
     step = np.zeros(movable.size)
     if not movable.any():
         return step, 0.0
-    h, g = gram.jj.sum(axis=0)[np.ix_(movable, movable)], gram.jr.sum(axis=0)[movable]
+    h, g = gram.jj.sum(axis=0)[movable][:, movable], gram.jr.sum(axis=0)[movable]
     while True:
         try:
             step[movable] = solve_scaled(h, g, damping)

@@ -1,5 +1,6 @@
 """Where a fit starts: the linear part in closed form, everything else at its null (or `start`)."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,6 +9,7 @@ from barberpole.effects.misalignment import LOWER, UPPER
 from barberpole.errors import InputError
 from barberpole.fit.affine import Moments, moments
 from barberpole.fit.ellipsoid import Ellipsoid, algebraic
+from barberpole.fit.few import few
 from barberpole.fit.spikes import isolated
 from barberpole.model import Model
 from barberpole.observations import Observations
@@ -41,7 +43,7 @@ def linear_part(seen: Observations, magnitude_ut: float, known_moments: Moments 
         return Linear(best[:, 1:], best[:, 0], max(float(np.max(seen.b_ut)), -float(np.min(seen.b_ut))))
     known = float(np.mean(seen.b_mag)) if seen.b_mag is not None else magnitude_ut
     bridge = _bridge(seen)
-    shape = trimmed(seen.y - seen.at.state * bridge[:, None], known)
+    shape = trimmed(seen.y - seen.at.state * bridge[:, None] if bridge.any() else seen.y, known)
     return Linear(np.linalg.inv(shape.upper), shape.centre, known, bridge)
 
 
@@ -61,9 +63,10 @@ def trimmed(y: np.ndarray, magnitude_ut: float) -> Ellipsoid:
     shape, kept = _first(y, magnitude_ut), np.ones(y.shape[1], bool)
     for _ in range(TRIMS):
         field = shape.field(y)
-        apart = np.abs(np.sqrt(np.einsum("ik,ik->k", field, field)) - magnitude_ut)
-        near = apart <= FAR * float(np.median(apart))
-        if np.array_equal(near, kept) or np.mean(near) < 0.5:
+        size2 = np.einsum("ik,ik->k", field, field)
+        far = FAR * float(np.median(np.abs(np.sqrt(size2[few(size2.size)]) - magnitude_ut)))
+        near = (size2 <= (magnitude_ut + far) ** 2) & (size2 >= max(magnitude_ut - far, 0.0) ** 2)
+        if np.array_equal(near, kept) or np.count_nonzero(near) < 0.5 * near.size:
             break
         shape, kept = algebraic(y[:, near], magnitude_ut), near
     return shape
@@ -96,7 +99,7 @@ def start_values(model: Model, linear: Linear) -> np.ndarray:
                 values[f"misalignment.{a}{b}"] = linear.matrix[i, j] / own[i]
     for at, name in enumerate(model.names):
         value = values.get(name)
-        if value is not None and np.isfinite(value) and not (name.startswith("scale") and value == 0.0):
+        if value is not None and math.isfinite(value) and not (name.startswith("scale") and value == 0.0):
             p[at] = value
     lower, upper = model.bounds()
-    return np.clip(p, lower, upper)
+    return np.minimum(np.maximum(p, lower), upper)

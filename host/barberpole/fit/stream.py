@@ -10,7 +10,6 @@ import numpy as np
 
 from barberpole.effects import Effect, find_effect
 from barberpole.errors import InputError, must
-from barberpole.fit import observability
 from barberpole.fit.fit import Fit, determined, fit_observations
 from barberpole.fit.gram import Gram, Tick, block_edges, empty
 from barberpole.fit.residual import Problem
@@ -94,7 +93,7 @@ def fit_stream(
     found = replace(
         first,
         p=solution.p,
-        white=observability.covariance(solution.gram, solution.free),
+        white=solution.covariance,
         gram=solution.gram,
         free=solution.free,
         converged=solution.converged,

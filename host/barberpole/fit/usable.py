@@ -4,9 +4,13 @@ The checks look for one fault each that good data do not show; what only lowers 
 errors.
 """
 
+from typing import Any
+
 import numpy as np
 
 from barberpole.errors import InputError, must
+from barberpole.fit.affine import Moments
+from barberpole.fit.few import few
 from barberpole.fit.spikes import no_surface
 from barberpole.fit.start import Linear
 from barberpole.observations import Observations
@@ -26,37 +30,39 @@ FILLED = 0.2  # robust deviation of |H|/K from 1: a ball of noise has 0.4, a bad
 GAIN_RATIO = 8.0  # between the axes of one sensor
 MAD = 1.4826
 EDGE = 0.1  # of the rows on either side, too few to be a level
+UNEVEN = 0.6 * STEP * EDGE**0.5  # relative deviation of |B|: the least step at the edge has 1.4 times that
 
 
-def require_usable(seen: Observations, linear: Linear, magnitude_ut: float) -> None:
-    """Raise InputError with the reason and what to do next."""
+def require_usable(seen: Observations, linear: Linear, magnitude_ut: float, known: Moments | None = None) -> None:
+    """Raise InputError with the reason and what to do next. known: the moments against a vector reference."""
     require_in_range(seen.y)
-    require_microtesla(_largest_ut(seen, magnitude_ut))
-    if seen.b_ut is None:
-        _require_a_shell(seen, linear, magnitude_ut)
-    elif _spans(seen.b_ut):
+    if seen.b_ut is not None:
+        over: np.ndarray | float = np.sqrt(np.einsum("ij,ij->j", seen.b_ut, seen.b_ut))
+    else:
+        over = magnitude_ut if seen.b_mag is None else seen.b_mag
+    require_microtesla(float(np.max(over)))
+    some = few(seen.y.shape[1])
+    if known is None:
+        _require_a_shell(seen, linear, ratio := _over_known(seen, linear, over, some))
+    elif known.spans(SPANS):
         _require_own_axes(linear)
+        ratio = _over_known(seen, linear, over, some)
     else:
         return
-    require_one_field(_over_known(seen, linear, magnitude_ut), _causes(seen), seen.row)
+    if np.std(ratio) > UNEVEN * np.mean(ratio):  # then every sample is worth its time
+        require_one_field(_over_known(seen, linear, over), _causes(seen), seen.row)
 
 
-def _largest_ut(seen: Observations, magnitude_ut: float) -> float:
-    if seen.b_ut is not None:
-        return float(np.max(np.linalg.norm(seen.b_ut, axis=0)))
-    return float(np.max(seen.b_mag)) if seen.b_mag is not None else magnitude_ut
-
-
-def _over_known(seen: Observations, linear: Linear, magnitude_ut: float) -> np.ndarray:
-    """(n,) magnitude of the linear part's field over the known one; 1 where that is null."""
-    known = np.full(seen.y.shape[1], magnitude_ut) if seen.b_mag is None else seen.b_mag
-    if seen.b_ut is not None:
-        known = np.linalg.norm(seen.b_ut, axis=0)
-    y = seen.y - linear.offset[:, None] - np.asarray(seen.at.state) * linear.bridge[:, None]
+def _over_known(seen: Observations, linear: Linear, known: np.ndarray | float, some: Any = slice(None)) -> np.ndarray:
+    """(k,) magnitude of the linear part's field over the known one (n,), of some samples; 1 where that is null."""
+    y = seen.y[:, some] - linear.offset[:, None]
+    known = known if np.ndim(known) == 0 else np.asarray(known)[some]
+    if linear.bridge.any():
+        y -= np.broadcast_to(seen.at.state, seen.y.shape[1:])[some] * linear.bridge[:, None]
     field = np.linalg.inv(linear.matrix) @ y  # a solve with as many right sides as samples is ten times slower
     found = np.sqrt(np.einsum("ij,ij->j", field, field))
-    usable = known > 0.1 * known.max()
-    return np.where(usable, found / np.where(usable, known, 1.0), 1.0)
+    usable = known > 0.1 * np.max(known)
+    return found / known if np.all(usable) else np.where(usable, found / np.where(usable, known, 1.0), 1.0)
 
 
 def _causes(seen: Observations) -> list[np.ndarray]:
@@ -68,8 +74,8 @@ def _causes(seen: Observations) -> list[np.ndarray]:
 
 def require_in_range(y: np.ndarray) -> None:
     """Raise InputError where readings (3, n) pile up at an end of the converter's range."""
-    for axis, readings in zip("xyz", y, strict=True):
-        for end, beyond in ((readings.max(), np.less), (readings.min(), np.greater)):
+    for axis, readings, high, low in zip("xyz", y, y.max(axis=1), y.min(axis=1), strict=True):
+        for end, beyond in ((high, np.less), (low, np.greater)):
             at = readings == end
             count = int(np.count_nonzero(at))
             if count < max(RAIL_ROWS, RAIL * readings.size) or count == readings.size:
@@ -95,17 +101,13 @@ def require_microtesla(largest: float, what: str = "the reference field") -> Non
         raise InputError(must(what, wanted, f"{largest:.3g}: is it in {unit}?"))
 
 
-def _spans(field_ut: np.ndarray) -> bool:
-    size = np.linalg.svd(np.cov(field_ut), compute_uv=False) if field_ut.shape[1] > 3 else np.zeros(3)
-    return bool(size[2] > SPANS**2 * size[0])
-
-
 def _require_own_axes(linear: Linear) -> None:
     """Raise InputError where a reading follows no component of the known field, or another one than its own."""
     gain = np.linalg.norm(linear.matrix, axis=1)
+    usual = sorted(gain)[1]
     for i, axis in enumerate("xyz"):
-        if gain[i] < DEAD * np.median(gain):
-            got = f"{axis}_lsb with {gain[i]:.2g} LSB/µT, the others with {np.median(gain):.2g}"
+        if gain[i] < DEAD * usual:
+            got = f"{axis}_lsb with {gain[i]:.2g} LSB/µT, the others with {usual:.2g}"
             wanted = "such as follow the field (a dead bridge, a broken wire?)"
             raise InputError(must("the readings", wanted, got))
         if abs(linear.matrix[i, i]) < CROSSED * gain[i]:
@@ -114,11 +116,13 @@ def _require_own_axes(linear: Linear) -> None:
             raise InputError(must("the readings", wanted, f"{axis}_lsb that follows b{other}_ut and not b{axis}_ut"))
 
 
-def _require_a_shell(seen: Observations, linear: Linear, magnitude_ut: float) -> None:
-    """Raise InputError where readings fill a ball of noise, or lie in a flat cloud that was drawn out into a sphere."""
-    off = np.abs(_over_known(seen, linear, magnitude_ut) - 1.0)
+def _require_a_shell(seen: Observations, linear: Linear, ratio: np.ndarray) -> None:
+    """Raise InputError where readings fill a ball of noise, or lie in a flat cloud that was drawn out into a sphere.
+
+    ratio (k,) of the magnitude found to the known one.
+    """
     gain = np.linalg.norm(linear.matrix, axis=1)
-    if MAD * float(np.median(off)) > FILLED or gain.max() > GAIN_RATIO * gain.min():
+    if MAD * float(np.median(np.abs(ratio - 1.0))) > FILLED or gain.max() > GAIN_RATIO * gain.min():
         raise InputError(no_surface(seen.y))
 
 
