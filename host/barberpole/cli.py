@@ -31,6 +31,7 @@ from barberpole.commands import (
     workbench,
 )
 from barberpole.errors import BarberpoleError, must
+from barberpole.files import FULL, cannot_write
 
 interrupt.loaded()
 
@@ -98,6 +99,8 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:  # where nobody could say more: a full disk, a folder that is a file
+        if error.errno in FULL:
+            return _refuse(str(cannot_write("what is written", error, error.filename or "")))
         return _refuse(must("a file or folder", "one that can be used", error.strerror or error, error.filename or ""))
     except LinAlgError as error:
         return _refuse(must("the log", "one that determines what is asked", f"readings without a solution: {error}"))

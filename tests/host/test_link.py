@@ -1,6 +1,7 @@
 """Recording over a cable: the file is there when it is whole, and whatever ends a recording leaves no half of one."""
 
 import os
+import resource
 import subprocess
 import threading
 import tty
@@ -78,6 +79,23 @@ def test_a_cable_unplugged_keeps_what_was_recorded(cable, says, tmp_path):
         os.close(cable[0])
 
     assert record(cable[1], tmp_path / "log.bpr", start=says(1), tick=tick) == 1
+
+
+def test_a_full_disk_keeps_the_last_recording_and_what_was_recorded(cable, says, tmp_path):
+    target = tmp_path / "log.bpr"
+    target.write_bytes(b"of yesterday")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(InputError, match=r"on a disk with room; got File too large after \d+ records") as refused:
+            record(cable[1], target, start=says(90))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    kept = len(decode((tmp_path / "log-part.bpr").read_bytes()).frames)
+    assert kept > 10
+    assert f"after {kept} records, which are in log-part.bpr" in str(refused.value)
+    assert target.read_bytes() == b"of yesterday"
+    assert names(tmp_path) == ["log-part.bpr", "log.bpr"]
 
 
 def test_a_silent_board_is_told_and_the_last_recording_stays(cable, tmp_path, monkeypatch):

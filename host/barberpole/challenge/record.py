@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-from pyarrow import csv
 
 from barberpole.challenge import motion, noise
 from barberpole.challenge.world import Hidden, Scene, reading, strength_for
+from barberpole.files import write_atomic
+from barberpole.log_formats import write_csv
 
 FS_HZ = 40.0
 REST_S = 60.0
@@ -128,6 +128,6 @@ def rest(recipe: Recipe, slower: int = 1) -> dict[str, np.ndarray]:
 
 
 def write(columns: dict[str, np.ndarray], path: Path) -> Path:
-    """The columns as CSV."""
-    csv.write_csv(pa.table(columns), path)
+    """The columns as CSV. Raises InputError as `write_atomic`."""
+    write_atomic(path, write_csv(columns))
     return path

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 from barberpole.commands.console import AS_JSON, ERR, OUT, print_json, table
 from barberpole.errors import InputError, must
+from barberpole.files import cannot_write
 
 
 def register(app: typer.Typer) -> None:
@@ -62,7 +63,7 @@ def _writable(folder: Path) -> Path:
         elif not folder.is_dir():
             raise FileExistsError(0, "a file")
     except OSError as error:
-        raise InputError(must("the output", "a folder that can be written", error.strerror, folder)) from None
+        raise cannot_write("the output", error, folder) from None
     return folder
 
 

@@ -3,6 +3,7 @@
 A line that a crash cut short is not read. The file is locked while a run writes it, and goes when the output is there.
 """
 
+import contextlib
 import fcntl
 import json
 import os
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from barberpole.errors import InputError, must
+from barberpole.files import cannot_write
 
 Row = dict[str, Any]
 SYNC_S = 1.0  # a power cut loses no more than this
@@ -33,21 +35,25 @@ class Journal:
             got = "one that another run is writing"
             raise InputError(must("the output", "a file of this run alone", got, self.path)) from None
         except OSError as error:
-            raise InputError(must("the output", "in a folder that can be written", error.strerror, self.path)) from None
+            raise cannot_write("the output", error, self.path) from None
         self.done = {row["log_sha256"]: row for row in rows_of(self.path, self.key) if row["log_sha256"]}
         self._file.write(b"\n" if self.path.stat().st_size else b"")  # ends a line that was cut short
         return self
 
     def __exit__(self, *_error) -> None:
-        self._file.close()
+        with contextlib.suppress(OSError):  # a full disk was said by `add`
+            self._file.close()
         if self.path.exists() and not self.path.stat().st_size:
             self.path.unlink()
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Append rows and hand them to the system at once."""
+        """Append rows and hand them to the system at once. Raises InputError where the disk is full."""
         lines = [json.dumps({"key": self.key, "row": row}) + "\n" for row in rows]
-        self._file.write("".join(lines).encode())
-        self._file.flush()
+        try:
+            self._file.write("".join(lines).encode())
+            self._file.flush()
+        except OSError as error:
+            raise cannot_write("the journal", error, self.path) from None
         if time.monotonic() - self._synced > SYNC_S:
             os.fsync(self._file.fileno())
             self._synced = time.monotonic()

@@ -1,10 +1,12 @@
 """A file that comes over a cable: there when it is whole, not there before."""
 
+import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from barberpole.errors import InputError, must
+from barberpole.files import cannot_write, require_file
 
 
 @contextmanager
@@ -13,15 +15,14 @@ def arriving(target: Path) -> Iterator[Path]:
 
     Raises InputError where `target` cannot be written, before anything is asked of the board if that can be known.
     """
-    beside = target.with_name(f"{target.name}.part")
+    require_file(target)
+    beside = target.with_name(f"{target.name}.tmp-{os.getpid()}-{secrets.token_hex(4)}")
     try:
         beside.touch()
-        if target.is_dir():
-            raise IsADirectoryError(0, "a folder")
         yield beside
         beside.replace(target)
     except OSError as error:
-        raise InputError(must("the output file", "in a folder that can be written", error.strerror, target)) from None
+        raise cannot_write("the output file", error, target) from None
     finally:
         if beside.parent.is_dir():
             beside.unlink(missing_ok=True)

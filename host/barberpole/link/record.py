@@ -8,7 +8,8 @@ from pathlib import Path
 
 import serial
 
-from barberpole.errors import PortError, must
+from barberpole.errors import InputError, PortError, must
+from barberpole.files import cannot_write
 from barberpole.link.arriving import arriving
 from barberpole.link.mpremote import require_port
 
@@ -36,15 +37,30 @@ def record(
 
     `start` is called once the port is open and listening. The file appears when the recording ends, by an unplugged
     cable too, and by Ctrl-C if it is `stoppable`: otherwise Ctrl-C goes on to the caller, and nothing is kept. Raises
-    PortError if the port is not there or nothing was heard; no file is left then.
+    PortError if the port is not there or nothing was heard; no file is left then. Raises InputError where the disk is
+    full: `target` is as before then, and what came until then is in a file beside it.
     """
     require_port(port)
     with arriving(target) as beside:
-        kept = _record(port, beside, frames, _Clock(seconds), start, tick or (lambda _: None), stoppable)
+        try:
+            kept = _record(port, beside, frames, _Clock(seconds), start, tick or (lambda _: None), stoppable)
+        except OSError as error:
+            raise _cut(beside, target, error) from None
         if not kept:
             silence = f"silence for {SILENCE_S if seconds is None else min(seconds, SILENCE_S):g} s"
             raise PortError(must(f"the board on {port}", "sending records (main.py running)", silence))
     return kept
+
+
+def _cut(beside: Path, target: Path, error: OSError) -> InputError:
+    """What to say of a recording that the disk had no room for; its whole frames stay."""
+    count = beside.read_bytes().count(b"\n")
+    if not count:
+        return cannot_write("the output file", error, target)
+    part = target.with_name(f"{target.stem}-part{target.suffix}")
+    beside.replace(part)
+    said = f"{error.strerror or error} after {count} records, which are in {part.name}"
+    return cannot_write("the output file", OSError(error.errno, said), target)
 
 
 @dataclass(frozen=True)

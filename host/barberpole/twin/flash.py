@@ -8,7 +8,7 @@ from pathlib import Path
 
 from barberpole.built import for_processor, read_built, romfs_image
 from barberpole.errors import InputError, must
-from barberpole.files import write_atomic
+from barberpole.files import cannot_write, write_atomic
 from barberpole.mpy import ARCHITECTURES
 from barberpole.twin.interpreter import SHIMS
 
@@ -25,10 +25,10 @@ def make_image(path: Path, size_kib: int, files: Mapping[str, str | Path], micro
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if not path.exists():
-            path.write_bytes(ERASED * (size_kib * KIB))
     except OSError as error:
-        raise InputError(must("the flash folder", "one that can be written", error.strerror, path.parent)) from None
+        raise cannot_write("the flash folder", error, path.parent) from None
+    if not path.exists():
+        write_atomic(path, ERASED * (size_kib * KIB))
     if files:
         _fill(path, files, micropython)
 

@@ -180,8 +180,14 @@ class Watch:
         if self._file is None:
             return
         *whole, self._pending = (self._pending + data).split(b"\n")
-        self._file.write(b"".join(text.rstrip(b"\r") + b"\n" for text in whole if text.startswith(b"$")))
-        self._file.flush()
+        try:
+            self._file.write(b"".join(text.rstrip(b"\r") + b"\n" for text in whole if text.startswith(b"$")))
+            self._file.flush()
+        except OSError as error:  # a full disk ends the recording, not the watching
+            self.events.append(f"recording {self._name} ended: {error.strerror}")
+            with contextlib.suppress(OSError):
+                self._file.close()
+            self._file, self._name = None, ""
 
     def _take(self, frames: list[Frame]) -> None:
         rows = []
