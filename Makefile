@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: trials coverage fuzz release-check demo test lint bench soak docs pictures reproduce clean
+.PHONY: trials coverage lines mutation fuzz release-check demo test lint bench soak docs pictures reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo
@@ -35,6 +35,14 @@ trials: $(STAMP)
 # Intervals of 95 % over 500 logs of every effect, in white and in 1/f noise: half an hour.
 coverage: $(STAMP)
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m truth.coverage
+
+# Which lines the tests run: the host's, the generator's, and the firmware's in MicroPython. A quarter of an hour.
+lines: $(STAMP)
+	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m lines
+
+# Small faults put into fit, diagnosis, effects and generator, one at a time; how many the tests notice. An hour.
+mutation: $(STAMP)
+	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m mutation
 
 # Ten thousand damaged files of every kind through the command line: no traceback, no hang, no lost memory.
 fuzz: $(STAMP)

@@ -13,6 +13,7 @@ from barberpole.board_log import read_board_log
 from barberpole.cli import run as command
 from barberpole.errors import InputError
 from barberpole.link.deploy import flash, pull
+from barberpole.link.listen import ask
 from barberpole.link.record import record
 from barberpole.log_formats import write_csv
 from barberpole.nominal import nominal
@@ -192,6 +193,46 @@ def test_what_is_wrong_with_all_is_said_of_the_board(later):
         name: ["coil_current", "gain_drift"] for name in "ab"
     }
     assert names(power_up(later, faults=("supply_low",))) == ["supply_low"]
+
+
+def asked(twin, line):
+    return ask(twin.port, line)[-1]
+
+
+def test_commands_are_answered_while_it_streams(later):
+    power_up(later)
+    before = asked(later, "status")
+    assert (before["state"], before["names"]) == ("streaming", [])
+    again = asked(later, "selfcal now")
+    assert (again["done"], again["verdict"]["accepted"]) == (True, True)
+    assert {name: of["seq"] - before["sensors"][name]["seq"] for name, of in again["verdict"]["sensors"].items()} == {
+        "a": 1,
+        "b": 1,
+    }
+    assert asked(later, "stop")["state"] == "stopped"
+    at_rest = asked(later, "status")["rows"]
+    assert asked(later, "status")["rows"] == at_rest
+    assert (asked(later, "stream")["done"], asked(later, "status")["rows"] > at_rest) == (True, True)
+    refused = asked(later, "read cal")  # of one sensor; an array has it in its status
+    assert not refused["done"]
+    assert refused["text"].endswith("factory reset, read log, selfcal now, status, stop, stream")
+
+
+def test_a_factory_reset_is_of_all_sensors_and_in_the_log(later):
+    power_up(later)
+    assert asked(later, "selfcal now")["done"]
+    assert asked(later, "factory reset")["done"]
+    status = asked(later, "status")
+    assert names(status) == ["factory_reset"]
+    assert {(of["in_force"], of["seq"], *of["in_force_gain"]) for of in status["sensors"].values()} == {
+        ("factory", 0, 1.0, 1.0, 1.0)
+    }
+    *answers, count = ask(later.port, "read log")
+    assert (count["entries"], count["dropped"]) == (len(answers), 0)
+    assert answers[-1]["entry"]["name"] == "factory_reset"
+    assert answers[-1]["entry"]["boot"] == status["boot"]
+    kept = power_up(later, faults=("coil_open_x",))  # nothing new is stored
+    assert {of["in_force"] for of in kept["sensors"].values()} == {"factory"}
 
 
 def test_a_fault_of_the_second_sensor_needs_one(folder):

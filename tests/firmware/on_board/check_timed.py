@@ -1,106 +1,10 @@
-# check_timed.py: the timed sampler in MicroPython itself, on a ring that a clock fills: sums, pauses, no allocation.
-# The registers are proved elsewhere (test_timers.py); here they are a dictionary that nobody looks at.
-import sys
-from array import array
-
+# check_timed.py: the timed sampler in MicroPython itself, on a ring that a clock fills: sums, pauses, no allocation,
+# and what it does when the hardware fails. The registers are proved elsewhere (test_timers.py).
 import micropython
 
-from fakes import run
-
-
-class Clock:  # two microseconds a look
-    def __init__(self):
-        self.now = 0
-
-    def ticks_us(self):
-        self.now += 2
-        return self.now
-
-    def ticks_diff(self, end, start):
-        return end - start
-
-    def ticks_add(self, ticks, delta):
-        return ticks + delta
-
-    def sleep_us(self, us):
-        self.now += us
-
-
-class Memory(dict):
-    def __getitem__(self, address):
-        return self.get(address, 0)
-
-
-class Registers:
-    def __init__(self):
-        self.mem8, self.mem32 = Memory(), Memory()
-
-    def __getattr__(self, name):
-        return 0
-
-
-class Names:
-    pass
-
-
-for name in ("machine", "pyb", "uctypes"):
-    sys.modules[name] = Names()
-sys.modules["stm"] = Registers()
-sys.modules["time"] = time = Clock()
-
-from bp_ring import SLIPPED  # noqa: E402
-from bp_timed import TimedSampler  # noqa: E402
-from bp_timers import Plan  # noqa: E402
-
-SCANS, KEPT, SLOTS = 10, 8, 24
-RATE_HZ = 100
-
-
-class Scan:  # place by the clock; codes tell the axis, the half cycle and the cycle
-    def __init__(self):
-        self.ring = array("H", bytearray(2 * 2 * SCANS * 8 * SLOTS))
-        self.scan_us = 16
-        self.held = -1
-        for i in range(len(self.ring)):
-            scan, channel = i // 8, i % 8
-            self.ring[i] = 1000 + 100 * channel + (1000 if scan // SCANS % 2 == 0 else 0) + (scan & 1)
-
-    def position(self):
-        if self.held >= 0:
-            return self.held
-        passed = time.now - self.begin_us + 234  # a scan begins in the middle of its beat and takes 16 us
-        return passed // 500 % (2 * SCANS * SLOTS)
-
-    def silent(self):
-        return False
-
-    def stop(self):
-        pass
-
-    def start(self, used):
-        self.begin_us = time.now
-
-
-class Pulses:
-    def off(self):
-        pass
-
-    def prepare(self, plan):
-        pass
-
-    def start(self, plan):
-        return time.now
-
-    def stopped(self):
-        return False
-
-
-class Board:
-    SAMPLES_PER_HALF = KEPT
-
-
-def sampler_of():
-    return TimedSampler(Pulses(), Scan(), Plan(RATE_HZ, 8, 1, SCANS, 168000000, 84000000), Board)
+import bp_reasons as reasons
+from fakes import raises, run
+from timed_fakes import CYCLE_US, KEPT, SCANS, SLIPPED, SLOTS, sampler_of, time
 
 
 def check_sums_have_their_phase():
@@ -150,6 +54,81 @@ def check_a_place_that_stands_still_is_a_slip():
     sampler._scan.held = sampler._scan.position()
     time.sleep_us(5000)
     assert sampler._ring.behind() == SLIPPED
+
+
+def check_a_converter_that_was_silent_for_a_moment_costs_the_cycles_since_the_last():
+    sampler = sampler_of()
+    sampler.cycle()
+    before = sampler.cycles
+    sampler._scan.silences = 1
+    sampler.cycle()
+    assert sampler.cycles == before + 1 and sampler._scan.starts == 2
+    assert sampler.lost == 1, sampler.lost
+
+
+def check_a_converter_that_stays_silent_is_told_and_the_pulses_end():
+    sampler = sampler_of()
+    sampler.cycle()
+    sampler._scan.silences = 1000
+    assert raises(reasons.Fault, sampler.cycle).code == reasons.ADC_SILENT
+    assert not sampler._pulses.on and sampler._scan.starts == 4  # it was begun anew three times
+
+
+def check_a_broken_loop_is_told_and_nothing_begins_anew():
+    sampler = sampler_of()
+    sampler.cycle()
+    sampler._pulses.broken = True
+    assert raises(reasons.Fault, sampler.cycle).code == reasons.FLIP_STOPPED
+    assert not sampler._pulses.on and sampler._scan.starts == 1
+
+
+def check_what_was_overwritten_while_it_was_read_is_not_taken():
+    sampler = sampler_of()
+    sampler.cycle()
+    before, half = sampler.mid_us, sampler._half
+    waits = [SLOTS * CYCLE_US + 3000]
+
+    def slow(into, first):
+        half(into, first)
+        if waits:
+            time.sleep_us(waits.pop())
+
+    sampler._half = slow
+    sampler.clear()
+    sampler.cycle()
+    assert sampler.cycles == 1  # and that one is whole
+    assert sampler.sums[0] == KEPT * (2000 - 2048) + KEPT // 2, list(sampler.sums)
+    assert (sampler.mid_us - before) // CYCLE_US - 1 == sampler.lost > 0, sampler.lost
+
+
+def check_fresh_begins_anew_where_scans_were_missed():
+    sampler = sampler_of()
+    sampler.fresh()
+    sampler.cycle()
+    assert sampler._scan.starts == 1
+    sampler._scan.held = sampler._scan.position()
+    time.sleep_us(5000)
+    sampler.fresh()
+    assert sampler._scan.starts == 2
+
+
+def check_the_ends_of_the_converter_are_told_by_axis():
+    for code in (0, 4095):
+        sampler = sampler_of()
+        last_of_half = 2 * SCANS + SCANS - 1  # after the SET pulse, of the first cycle that is read
+        sampler._scan.ring[8 * last_of_half + 1] = code  # of y
+        sampler.cycle()
+        assert sampler.clipped == 0b010
+        assert raises(reasons.Fault, sampler.check).code == reasons.SATURATED
+
+
+def check_an_axis_whose_samples_never_differ_is_stuck():
+    sampler = sampler_of()
+    for i in range(2, len(sampler._scan.ring), 8):
+        sampler._scan.ring[i] = 1234
+    sampler.cycle()
+    assert sampler.clipped == 0
+    assert raises(reasons.Fault, sampler.check).code == reasons.ADC_STUCK
 
 
 run(globals())
