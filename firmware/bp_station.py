@@ -15,6 +15,7 @@ import bp_store
 import bp_trajectory as trajectory
 from bp_clock import Clock
 from bp_console import Console
+from bp_duty import FAULT, STOPPED, STREAMING
 from bp_fast import fast_row
 from bp_hardware import Hardware
 from bp_log import Log
@@ -22,9 +23,6 @@ from bp_watchdog import Watchdog
 
 FOLDER = "bp"  # below the working folder: /flash on a pyboard, / elsewhere
 RUN_FILE = FOLDER + "/run.bpr"
-STREAMING = "streaming"
-STOPPED = "stopped"
-FAULT = "fault"  # no samples can be had
 
 
 class Station:  # all that the running board knows
@@ -52,6 +50,9 @@ class Station:  # all that the running board knows
         if self.fast is not None:
             self.fast.put_in_force(self.hardware.compensator)
 
+    def pause(self):  # the flash is written only while nothing is acquired
+        self.hardware.sampler.stop()
+
     def event(self, code, detail="", **values):  # said now, and in the flash at the next pause
         now_s = self.clock.now_s()
         report.event(self.writer, now_s, code, detail)
@@ -70,7 +71,7 @@ def self_calibrate(station, notes):  # the whole of it, at power-up or when aske
     if not codes:
         result = _measure(station)
         codes, detail = result.reasons, result.detail
-    station.hardware.sampler.stop()  # the flash is written only while nothing is acquired
+    station.pause()
     if result is not None and result.accepted:
         held = _save(station.store, held, result, notes)
     station.put_in_force(held)

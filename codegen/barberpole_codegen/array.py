@@ -26,8 +26,11 @@ ROLE = "array"
 Progress = Callable[[str], None]
 SHARED = (
     MAIN,
-    *(f"bp_{name}.py" for name in ("ads131m08", "clock", "coils", "compensate", "console", "dac80504", "fixed")),
-    *(f"bp_{name}.py" for name in ("flip", "frame", "givens", "log", "native", "points", "reasons", "records")),
+    *(f"bp_{name}.py" for name in ("ads131m08", "clock", "coils", "compensate", "console", "dac80504", "duty")),
+    *(
+        f"bp_{name}.py"
+        for name in ("fixed", "flip", "frame", "givens", "log", "native", "points", "reasons", "records")
+    ),
     *(f"bp_{name}.py" for name in ("sampler", "selfcal", "store", "watchdog")),
 )
 """Of the firmware of one sensor; what stands on its one calibration has its counterpart in firmware/arrays."""

@@ -16,6 +16,7 @@ from bp_coils import Coils
 from bp_compensate import Compensator
 from bp_console import Console
 from bp_dac80504 import Dac80504
+from bp_duty import STOPPED
 from bp_flip import Flip
 from bp_log import Log
 from bp_points import Points
@@ -24,7 +25,6 @@ from bp_together import Follower, Part, Together
 from bp_watchdog import Watchdog
 
 FOLDER = "bp"
-STREAMING, STOPPED, FAULT = "streaming", "stopped", "fault"  # FAULT: no sensor gives samples
 
 
 class Member:  # what belongs to one sensor
@@ -77,6 +77,9 @@ class Station:
         first = Ads131m08(bus, selects[0], machine.Pin(board.ADC_DRDY_PIN, machine.Pin.IN), reset)
         chips = [first] + [Follower(bus, select) for select in selects[1:]]
         self.sampler = Together(tuple([Part(chip, board) for chip in chips]), self.flip, reset, board)
+
+    def pause(self):  # nothing is acquired between cycles here
+        pass
 
     def off(self):  # pulses, then coils
         self.flip.off()

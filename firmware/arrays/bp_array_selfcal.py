@@ -12,7 +12,8 @@ import bp_records as records
 import bp_selfcal
 import bp_store
 import bp_trajectory as trajectory
-from bp_array import FAULT, FOLDER, STREAMING
+from bp_array import FOLDER
+from bp_duty import FAULT, STREAMING
 
 RUN_FILE = FOLDER + "/run.bpr"
 _UNREAD = "the converter that reads the currents back gives no samples"

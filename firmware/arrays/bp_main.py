@@ -1,16 +1,12 @@
 # bp_main.py of an array: power-up with one self-calibration of all sensors, then a row a cycle and commands of a host
 # in between, until Ctrl-C: coils at zero, flip pins low, back to the REPL without a word.
-from micropython import const
-
-import bp_array_commands as commands
 import bp_array_report as report
+import bp_duty as duty
 import bp_reasons as reasons
 import bp_records as records
-from bp_array import FAULT, STREAMING, Station
+from bp_array import Station
+from bp_array_commands import COMMANDS
 from bp_array_selfcal import self_calibrate
-
-_HALF_REPEAT = const(128)  # rows between header and verdict, which are said again for a host that joins later
-_IDLE_MS = const(100)
 
 
 def run():
@@ -20,26 +16,12 @@ def run():
         if station.watchdog.bit:
             station.event(reasons.WATCHDOG)
         self_calibrate(station)
-        serve(station)
+        duty.serve(station, lambda: row(station), COMMANDS)
     except KeyboardInterrupt:
         pass
     finally:
         station.off()
     station.watchdog.let_go()
-
-
-def serve(station):
-    station.watchdog.start()
-    while True:
-        if station.state == STREAMING:
-            row(station)
-            command = station.console.command()
-        else:
-            station.clock.rest()
-            command = station.console.command(_IDLE_MS)
-        station.watchdog.feed()
-        if command is not None:
-            commands.obey(station, command)
 
 
 def row(station):  # samples one cycle and says it
@@ -49,17 +31,15 @@ def row(station):  # samples one cycle and says it
     try:
         sampler.cycle()
     except reasons.Fault:  # none is left
-        station.state = FAULT
+        station.state = duty.FAULT
     if sampler.live is not live or any(member.part.clipped for member in station.members):
         _tell(station)
-    if station.state == FAULT:
+    if station.state == duty.FAULT:
         station.log.flush()
         return
     station.clock.go_to(sampler.mid_us)
     station.writer.frame(records.ROW, report.row(station.members, station.clock.us()))
-    station.rows += 1
-    if station.rows % _HALF_REPEAT == 0:
-        station.writer.again(station.said[station.rows // _HALF_REPEAT & 1])
+    duty.count_row(station)
 
 
 def _tell(station):  # once each, until the next self-calibration

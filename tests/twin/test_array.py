@@ -152,6 +152,21 @@ def test_the_board_compensates_each_sensor(later, folder):
     assert 5000.0 * np.array(apart) == pytest.approx(np.array(GRADIENT_NT_PER_M), abs=GRADIENT_OFF_NT_PER_M)
 
 
+def test_each_sensor_says_what_its_calibration_is(later):
+    power_up(later)
+    read = ask(later.port, "read cal")[-1]
+    assert read["done"]
+    assert sorted(read["sensors"]) == ["a", "b"]
+    status = ask(later.port, "status")[-1]["sensors"]
+    for name, of in read["sensors"].items():
+        assert (of["in_force"], of["seq"]) == (status[name]["in_force"], status[name]["seq"])
+        assert of["gain"] == status[name]["in_force_gain"]
+        assert of["gain"] == pytest.approx([1.0] * 3, abs=0.01)
+    assert read["sensors"]["a"]["calibration"] != read["sensors"]["b"]["calibration"]
+    refused = ask(later.port, "read all")[-1]
+    assert "one of factory reset, read cal" in refused["text"]
+
+
 def asked_for_status(twin, path):
     """Rows as columns, and the answer to `status`."""
     record(twin.port, path, 300, start=lambda line: line.write(b"status\r"))
