@@ -119,21 +119,27 @@ def _add_longer(longer: Lengthening, block: int, r: np.ndarray, j: np.ndarray, c
 
 
 def heldout_rms(gram: Gram) -> float:
-    """RMS residual of each block under the parameters fitted without it.
+    """RMS residual of each fold under the parameters fitted to the others, all together."""
+    return float(np.sqrt(sum(square for square, _ in by_fold(gram)) / gram.count))
 
-    At the optimum the fit without block b differs by one Gauss-Newton step, (H - H_b)^-1 g_b, and its residuals follow
-    from the same normal equations: no refit. Infinite where the rest does not determine the parameters.
+
+def by_fold(gram: Gram) -> Iterator[tuple[float, float]]:
+    """Sum of the squared residuals of each fold under the parameters fitted to the others, and how many they are.
+
+    At the optimum the fit without some blocks differs by one Gauss-Newton step, (H - H_b)^-1 g_b, and its residuals
+    follow from the same normal equations: no refit. Infinite where the rest does not determine the parameters.
     """
-    total, left = gram.jj.sum(axis=0), 0.0
+    total = gram.jj.sum(axis=0)
     for fold in range(FOLDS):
         out = [fold, fold + FOLDS]
         h, g = gram.jj[out].sum(axis=0), gram.jr[out].sum(axis=0)
         try:
             shift = solve_scaled(total - h, -g)
         except np.linalg.LinAlgError:
-            return float("inf")
-        left += gram.rr[out].sum() - 2.0 * shift @ g + shift @ h @ shift
-    return float(np.sqrt(max(left, 0.0) / gram.count))
+            yield float("inf"), float(gram.m[out].sum())
+            continue
+        left = gram.rr[out].sum() - 2.0 * shift @ g + shift @ h @ shift
+        yield max(float(left), 0.0), float(gram.m[out].sum())
 
 
 def solve_scaled(h: np.ndarray, g: np.ndarray, damping: float = 0.0) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.fit.gram import FOLDS, Gram, solve_scaled
+from barberpole.fit.gram import by_fold
 from barberpole.workbench.bench import Bench
 from barberpole.workbench.lab import Lab
 
@@ -42,16 +42,5 @@ def rivals(lab: Lab, one: Bench, other: Bench) -> Comparison:
 def _by_fold(lab: Lab, bench: Bench) -> list[float]:
     """RMS of each fold under the parameters fitted to the others, as `heldout_rms` takes them together."""
     fit = lab.fit(bench)
-    gram: Gram = fit.gram.take(np.flatnonzero(fit.free))
-    total, errors = gram.jj.sum(axis=0), []
-    for fold in range(FOLDS):
-        out = [fold, fold + FOLDS]
-        h, g = gram.jj[out].sum(axis=0), gram.jr[out].sum(axis=0)
-        try:
-            shift = solve_scaled(total - h, -g)
-        except np.linalg.LinAlgError:
-            errors.append(float("inf"))
-            continue
-        left = gram.rr[out].sum() - 2.0 * shift @ g + shift @ h @ shift
-        errors.append(float(np.sqrt(max(left, 0.0) / gram.m[out].sum())))
-    return errors
+    folds = by_fold(fit.gram.take(np.flatnonzero(fit.free)))
+    return [float(np.sqrt(square / max(count, 1.0))) for square, count in folds]
