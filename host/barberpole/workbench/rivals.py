@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.fit.gram import by_fold
+from barberpole.fit.gram import FOLDS, by_fold
 from barberpole.workbench.bench import Bench
 from barberpole.workbench.lab import Lab
 
