@@ -16,6 +16,7 @@ WIDEST_SHIFT = 31
 LEFT_SHIFT = 15
 ENOUGH = 2.0**-33  # relative error of a Newton step that is not followed by another
 STEEPEST = 64.0  # largest over smallest value of what is divided by: more would need many steps
+STEEPEST_ROOT = 40.0  # the same of what a root is taken of, where a first guess beyond 50 leads nowhere
 
 
 @dataclass
@@ -86,7 +87,7 @@ class Machine:
     def _inverse(self, b: Fixed) -> Fixed:
         if b.interval.high < 0:
             return self.scaled(self._inverse(self.scaled(b, -1.0)), -1.0)
-        low, high = _positive(b, "what is divided by")
+        low, high = _positive(b, "what is divided by", STEEPEST)
         total, apart = low + high, high - low
         scale = 8.0 / (2.0 * total**2 - apart**2)
         off = apart**2 * scale / 8.0  # Chebyshev: 1 - b y0 = off T2
@@ -110,7 +111,7 @@ class Machine:
         return self._roots[s.register, s.k]
 
     def _inverse_root(self, s: Fixed) -> Fixed:
-        low, high = _positive(s, "what a root is taken of")
+        low, high = _positive(s, "what a root is taken of", STEEPEST_ROOT)
         start, slope, off = _line_to_inverse_root(low, high)
         within = low**-0.5, high**-0.5
         y = self._line(start, slope, s, Interval((1 - off) * within[1], (1 + off) * within[0]))
@@ -144,10 +145,10 @@ def _product(a: Fixed, b: Fixed) -> Interval:
     return Interval(min(corners), max(corners))
 
 
-def _positive(b: Fixed, what: str) -> tuple[float, float]:
+def _positive(b: Fixed, what: str, steepest: float) -> tuple[float, float]:
     low, high = b.interval.low - b.error, b.interval.high + b.error
-    if not (low > 0 and high < STEEPEST * low):
-        be = f"away from zero, within a factor {STEEPEST:g}"
+    if not (low > 0 and high < steepest * low):
+        be = f"away from zero, within a factor {steepest:g}"
         raise LimitError(must(what, be, f"{low:.3g} to {high:.3g}", "fixed point"))
     return low, high
 

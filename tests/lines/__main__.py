@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from coverage import Coverage, CoverageData
 
-from lines.copy import marked_copy
+from lines.copy import ALONE, marked_copy
 
 REPOSITORY = Path(__file__).parents[2]
 WANTED = {"host/barberpole": 0.92, "codegen/barberpole_codegen": 0.92, "firmware": 0.90}
@@ -56,7 +56,8 @@ def measured(folder: Path, words: list[str]) -> Coverage:
     python = [sys.executable, "-m", "coverage"]
     left_out = [word for test in LEFT_OUT for word in ("--deselect", test)]
     suite = [*python, "run", f"--rcfile={settings}", "-m", "pytest", "-n", "2", *left_out, *words]
-    subprocess.run(suite, cwd=copy, env=os.environ | {"PYTHONPATH": sources}, check=False)
+    places = {"PYTHONPATH": sources, "MICROPYPATH": f".frozen:{copy / ALONE}"}
+    subprocess.run(suite, cwd=copy, env=os.environ | places, check=False)
     subprocess.run([*python, "combine", "-q", f"--rcfile={settings}"], cwd=REPOSITORY, check=True)
     found = CoverageData(str(data))
     found.read()

@@ -8,6 +8,7 @@ from lines.marked import Markers
 LEFT_OUT = (".git", ".venv", "build", ".hypothesis", "__pycache__", ".pytest_cache", ".ruff_cache", "*.tmp-*")
 SHIMS = Path("host/barberpole/twin/shims")
 ON_BOARD = Path("tests/firmware/on_board")
+ALONE = Path("build/lines")  # for interpreters without a path of their own
 # Markers take flash and heap of the emulated board, which the tests would find missing.
 ROOM = (
     ("host/barberpole/twin/interpreter.py", "SHIM_HEAP = 32 * 1024", "SHIM_HEAP = 512 * 1024"),
@@ -24,7 +25,8 @@ def marked_copy(repository: Path, folder: Path, record: Path) -> Markers:
     for path in sorted((folder / "firmware").rglob("*.py")):
         path.write_text(markers.marked(str(path.relative_to(folder)), path.read_text()))
     record.write_bytes(b"")
-    for place in (SHIMS, ON_BOARD):
+    (folder / ALONE).mkdir(parents=True)
+    for place in (SHIMS, ON_BOARD, ALONE):
         (folder / place / "_lines.py").write_text(markers.recorder(str(record)))
     for name, old, new in ROOM:
         text = (folder / name).read_text()

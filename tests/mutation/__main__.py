@@ -41,9 +41,13 @@ def sample(share: float, seed: int, only: str) -> list[Mutant]:
         for path in sorted((REPOSITORY / package).glob("*.py")):
             module = str(path.relative_to(REPOSITORY))
             made = mutants(module, path.read_text()) if only in module else []
-            made.sort(key=lambda m: hashlib.sha256(f"{seed} {m.key}".encode()).digest())
+            made.sort(key=functools.partial(_mixed, seed))
             taken += itertools.islice(filter(compiles, made), math.ceil(share * len(made)))
-    return taken
+    return sorted(taken, key=lambda m: _mixed(seed, m))  # so that a part of it is a sample too
+
+
+def _mixed(seed: int, mutant: Mutant) -> bytes:
+    return hashlib.sha256(f"{seed} {mutant.key}".encode()).digest()
 
 
 def known() -> dict[str, str]:

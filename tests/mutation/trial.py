@@ -1,6 +1,7 @@
 """A mutant in a copy of the repository, and tests on it in a process that has the libraries loaded already."""
 
 import contextlib
+import itertools
 import os
 import resource
 import shutil
@@ -55,7 +56,7 @@ def tried(folder: Path, mutant: Mutant, stages: list[tuple[list[str], float]]) -
     """Run tests on a mutant until one notices; `stages`: tests and what they may take of processor time, s."""
     path = folder / mutant.module
     whole = path.read_text()
-    path.write_text(mutant.text)
+    _put(path, mutant.text)
     try:
         for tests, limit_s in stages:
             code, by = forked(folder, tests, limit_s)
@@ -63,7 +64,17 @@ def tried(folder: Path, mutant: Mutant, stages: list[tuple[list[str], float]]) -
                 return Verdict(mutant, KILLED if code > 0 else LATE, by)
         return Verdict(mutant, SURVIVED if stages else UNTESTED)
     finally:
-        path.write_text(whole)
+        _put(path, whole)
+
+
+def _put(path: Path, text: str) -> None:
+    """Write a module, with a time that it never had: compiled files of another text must not count as its own."""
+    path.write_text(text)
+    moment = next(_moments)
+    os.utime(path, (moment, moment))
+
+
+_moments = itertools.count(1_000_000_000)
 
 
 def forked(folder: Path, tests: list[str], limit_s: float) -> tuple[int, str]:
@@ -116,8 +127,6 @@ def _be_pytest(folder: Path, tests: list[str], limit_s: float, say: int) -> None
         os.chdir(folder)
         sources = [str(folder / name) for name in ("host", "codegen", "tests")]
         os.environ["PYTHONPATH"] = os.pathsep.join(sources)
-        os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-        sys.dont_write_bytecode = True
         sys.path[:] = [*sources, *(p for p in sys.path if not _is_ours(p))]
         code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests], plugins=[_First(say)]))
     finally:
