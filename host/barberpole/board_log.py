@@ -7,9 +7,8 @@ import numpy as np
 
 from barberpole.columns import CURRENT, RESET, SET, check_names
 from barberpole.errors import InputError, must
+from barberpole.frame_content import CODES, fault
 from barberpole.records import EVENT, FORMAT, HEADER, POINT, POINTS, RESULT, ROWS, RUN, SEQUENCES, TYPES, Frame, decode
-
-CODES = {"b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8", "f": "<f4", "d": "<f8"}
 
 
 @dataclass(frozen=True)
@@ -133,12 +132,8 @@ def _of_one_power_up(early: list[Frame], header: Frame) -> list[Frame]:
 def _checked_header(header: dict[str, Any], where: object) -> dict[str, Any]:
     if header.get("format") != FORMAT:
         raise InputError(must("the board record", f"of format {FORMAT}", f"format {header.get('format')}", where))
-    columns = header.get("columns", [])
-    for column in columns if isinstance(columns, list) else [columns]:
-        fits = isinstance(column, list) and len(column) == 3 and isinstance(column[2], int | float)
-        if not fits or column[1] not in CODES:
-            wanted = "a list of [name, struct code, scale]"
-            raise InputError(must("the board record's header columns", wanted, repr(column), where))
+    if said := fault(HEADER, header, where):
+        raise InputError(said)
     return header
 
 
@@ -151,11 +146,11 @@ def _rows(power_up: _PowerUp, where: object) -> tuple[dict[str, np.ndarray], int
     if not layout:
         raise InputError(must("the board record's header", "one with columns", "none", where))
     other_role = power_up.header.get("role") in ("coil_driver", "array")
-    check_names([str(name) for name, _, _ in layout], where, readings=not other_role)
+    check_names([name for name, _, _ in layout], where, readings=not other_role)
     kind = np.dtype([(f"{i} {name}", CODES[code]) for i, (name, code, _) in enumerate(layout)])
     whole = [f.payload for f in frames if f.payload and len(f.payload) % kind.itemsize == 0]
     table = np.frombuffer(b"".join(whole), kind)
-    columns = {str(name): table[f"{i} {name}"] * float(scale) for i, (name, _, scale) in enumerate(layout)}
+    columns = {name: table[f"{i} {name}"] * float(scale) for i, (name, _, scale) in enumerate(layout)}
     return (columns if table.size else {}), len(frames) - len(whole)
 
 

@@ -117,5 +117,10 @@ def _runs(plugin: Path) -> None:
 
 def _refuse(sentence: str) -> int:
     if sentence.strip():  # none where a bare `barberpole` has shown its help
-        print(f"barberpole: {' '.join(sentence.split())}", file=sys.stderr)
+        print(f"barberpole: {_printable(' '.join(sentence.split()))}", file=sys.stderr)
     return BAD_INPUT
+
+
+def _printable(text: str) -> str:
+    """A file's own words may hold what a terminal would obey."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

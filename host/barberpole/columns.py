@@ -27,6 +27,8 @@ def check_names(names: Sequence[str], where: object, readings: bool = True) -> N
     for number, name in enumerate(names, start=1):
         if not name:
             raise InputError(must(f"column {number}", "named", "no name", where))
+        if not name.isprintable():
+            raise InputError(must(f"the name of column {number}", "of printable characters", repr(name), where))
         if name in seen:
             raise InputError(must(f"column {name}", "there once", "it twice", where))
         seen.add(name)

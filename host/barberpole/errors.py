@@ -8,6 +8,8 @@
 Messages follow one pattern, built by `must`: what must be which; got what (where).
 """
 
+LONGEST = 500  # characters of what was got: a file may hold anything
+
 
 class BarberpoleError(Exception):
     """A problem that the user can mend; the message says what, where and what was expected."""
@@ -32,4 +34,9 @@ def must(what: str, be: str, got: object, where: object = "") -> str:
     'flip.pulse_us must be at least 5 µs; got 2 µs (boards/mine.toml)'
     """
     place = f" ({where})" if where else ""
-    return f"{what} must be {be}; got {got}{place}"
+    return f"{what} must be {be}; got {_short(str(got))}{place}"
+
+
+def _short(text: str) -> str:
+    """What was got, if it is long only its beginning."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}… ({len(text)} characters)"

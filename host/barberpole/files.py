@@ -4,10 +4,12 @@ import contextlib
 import errno
 import os
 import secrets
+import stat
 from pathlib import Path
 
 from barberpole.errors import InputError, must
 
+LARGEST_TEXT = 4 << 20  # bytes
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -48,17 +50,29 @@ def _remove(beside: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
-def read_bytes(path: str | Path, what: str) -> bytes:
-    """Content of a file. Raises InputError naming `what` it should have been ("the log", "the board file")."""
+def read_bytes(path: str | Path, what: str, largest: int | None = None) -> bytes:
+    """Content of a file of at most `largest` bytes.
+
+    Raises InputError naming `what` it should have been ("the log", "the board file").
+    """
+    path = Path(path)
     try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(must(what, "a file that can be read", error.strerror, path)) from None
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for, and a device may never end
+            got = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
+            raise InputError(must(what, "a file that can be read", got, path))
+        if largest is not None and found.st_size > largest:
+            raise InputError(must(what, f"a file of at most {largest} bytes", found.st_size, path))
+        return path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        got = getattr(error, "strerror", None) or error
+        raise InputError(must(what, "a file that can be read", got, path)) from None
 
 
 def read_text(path: str | Path, what: str) -> str:
-    """Text of a UTF-8 file. Raises InputError as `read_bytes`, and where the text is not UTF-8."""
+    """Text of a UTF-8 file that a person may have written. Raises InputError as `read_bytes`, and where the text is
+    not UTF-8, or longer than anybody writes."""
     try:
-        return read_bytes(path, what).decode("utf-8-sig")
+        return read_bytes(path, what, LARGEST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(must(what, "UTF-8 text", f"byte {error.object[error.start]:#04x}", path)) from None

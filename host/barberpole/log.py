@@ -17,6 +17,7 @@ from barberpole.board_log import SelfcalRun, read_board_log
 from barberpole.columns import KNOWN, READINGS, RESET, SET
 from barberpole.errors import InputError, must
 from barberpole.files import read_bytes, write_atomic
+from barberpole.frame_content import LARGEST, checked_meta
 from barberpole.log_formats import read_csv, read_parquet, write_csv, write_parquet
 from barberpole.polarity import pairs_are_raw
 
@@ -104,7 +105,7 @@ def _from_csv(data: bytes, path: Path) -> Log:
 
 def _from_parquet(data: bytes, path: Path) -> Log:
     columns, notes, meta = read_parquet(data, path)
-    return Log(columns, path, file_sha256(data), 0, tuple(notes), meta)
+    return Log(columns, path, file_sha256(data), 0, tuple(notes), checked_meta(meta, path))
 
 
 def _from_records(data: bytes, path: Path) -> Log:
@@ -133,6 +134,7 @@ def checked(log: Log) -> Log:
     if log.n == 0:
         raise InputError(must("the log", "one with rows", "only column names", log.path))
     log = _without_nan(log)
+    check_size(log)
     check_time(log)
     check_state(log)
     extra = names_of.unknown(log.columns)
@@ -167,6 +169,15 @@ def check_time(log: Log, before: int = 0) -> None:
         row = int(np.argmax(back)) + 1
         got = f"{log['t_s'][row]:.9g} after {log['t_s'][row - 1]:.9g} in row {before + row + 1}"
         raise InputError(must("column t_s", "times that do not go back", got, log.path))
+
+
+def check_size(log: Log, before: int = 0) -> None:
+    """Raise InputError where a known column holds what is no measured quantity: its square would end in infinity."""
+    for name, values in log.columns.items():
+        if name in KNOWN and values.size and max(values.max(), -values.min()) > LARGEST:
+            row = int(np.argmax(np.abs(values)))
+            got = f"{values[row]:.9g} in row {before + row + 1}"
+            raise InputError(must(f"column {name}", f"of at most {LARGEST:g}", got, log.path))
 
 
 def check_state(log: Log, before: int = 0) -> None:

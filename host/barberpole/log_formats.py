@@ -1,8 +1,10 @@
 """CSV and Parquet as columns of floats, and back: read fast by pyarrow, judged cell by cell only where it fails."""
 
+import codecs
 import csv
 import io
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -16,9 +18,14 @@ from barberpole.errors import InputError, must
 Columns = dict[str, np.ndarray]
 
 NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "None"]
-MOST_NUMBERS = 500_000_000  # 4 GB; a small Parquet file may claim any number of equal rows
+MOST_NUMBERS = 500_000_000  # 4 GB
+# A small Parquet file may claim any number of equal rows; measured ones take more room than this.
+FEW_NUMBERS, NUMBERS_A_BYTE = 20_000_000, 25
+LONGEST_HEADER = 1 << 20  # bytes of a CSV's first line
 THREADS_FROM = 1 << 20  # bytes; below, starting threads takes longer than reading
+LINE_END = re.compile(rb"[\r\n]")
 _META = b"barberpole"
+BAD_PARQUET = (ValueError, OSError, pa.ArrowException, RecursionError)  # the last: brackets in the metadata
 
 
 def read_csv(data: bytes, where: object, readings: bool = True) -> tuple[Columns, list[str], int]:
@@ -46,16 +53,26 @@ def read_parquet(data: bytes, where: object, readings: bool = True) -> tuple[Col
     """Columns of a Parquet file, notes, and the metadata that `write_parquet` put there."""
     try:
         claimed = pa_parquet.read_metadata(pa.BufferReader(data))
+        check_claims(claimed, len(data), where)
         if claimed.num_rows * claimed.num_columns > MOST_NUMBERS:
             got = f"{claimed.num_rows} rows of {claimed.num_columns} columns"
             raise InputError(must("the log", f"of at most {MOST_NUMBERS:g} numbers to be read whole", got, where))
         table = pa_parquet.read_table(pa.BufferReader(data), use_threads=len(data) > THREADS_FROM)
         meta = meta_of(table.schema)
-    except (ValueError, OSError) as error:
+    except BAD_PARQUET as error:
         raise InputError(must("the log", "a Parquet file", short(error), where)) from None
     check_names(table.column_names, where, readings)
     notes: list[str] = []
     return _floats(table, notes, where), notes, meta
+
+
+def check_claims(claimed: pa_parquet.FileMetaData, size: int, where: object) -> None:
+    """Raise InputError where a Parquet file of `size` bytes claims to hold more than its size can."""
+    parts = [claimed.row_group(at) for at in range(claimed.num_row_groups)]
+    unpacked = max([claimed.num_rows * claimed.num_columns, *(part.total_byte_size // 8 for part in parts)])
+    if claimed.num_rows < 0 or unpacked > max(FEW_NUMBERS, NUMBERS_A_BYTE * size):
+        got = f"{claimed.num_rows} rows of {claimed.num_columns} columns in {size} bytes"
+        raise InputError(must("the log", "a Parquet file of measured rows", got, where))
 
 
 def write_csv(columns: Columns) -> bytes:
@@ -80,15 +97,22 @@ def meta_of(schema: pa.Schema) -> dict[str, Any]:
 
 def header_of(data: bytes, where: object) -> list[str]:
     """The column names in the first line of a CSV. Raises InputError where it holds none."""
-    first = data.split(b"\n", 1)[0]
+    first = LINE_END.split(data[: LONGEST_HEADER + 1], maxsplit=1)[0]
+    if len(first) > LONGEST_HEADER:
+        got = "a longer one"
+        raise InputError(must("the log's first line", f"of at most {LONGEST_HEADER} characters", got, where))
     if not first.strip():
         raise InputError(must("the log", "a line of column names and rows under it", "an empty first line", where))
     try:
         line = first.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(must("the log's first line", "column names in UTF-8", "other bytes", where)) from None
+        got = "UTF-16" if first.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "other bytes"
+        raise InputError(must("the log's first line", "column names in UTF-8", got, where)) from None
     marked = line.startswith("#")  # numpy.savetxt writes its header so
-    names = [name.strip() for name in next(csv.reader([line.lstrip("# ").rstrip("\r")]), [])]
+    try:
+        names = [name.strip() for name in next(csv.reader([line.lstrip("# ")]), [])]
+    except csv.Error as error:  # a name of more characters than anybody writes
+        raise InputError(must("the log's first line", "column names", error, where)) from None
     if len(names) == 1 and any(mark in line for mark in ";\t"):
         raise InputError(must("the log's columns", "separated by commas", repr(line[:40]), where))
     if (marked and len(names) < 2) or all(_number(name) is not None for name in names):
@@ -148,4 +172,4 @@ def _first_text(values: pa.ChunkedArray) -> tuple[int, str]:
 
 def short(error: Exception) -> str:
     """The first line of an error."""
-    return str(error).splitlines()[0][:120]
+    return next(iter(str(error).splitlines()), type(error).__name__)[:120]

@@ -19,8 +19,9 @@ import pyarrow.parquet as pa_parquet
 
 from barberpole.columns import KNOWN, check_names, unknown
 from barberpole.errors import InputError, must
-from barberpole.log import Log, check_state, check_time
-from barberpole.log_formats import NULLS, header_of, meta_of, short
+from barberpole.frame_content import checked_meta
+from barberpole.log import Log, check_size, check_state, check_time
+from barberpole.log_formats import BAD_PARQUET, LONGEST_HEADER, NULLS, check_claims, header_of, meta_of, short
 
 BIG_CSV, BIG_PARQUET = 50_000_000, 500_000  # bytes, rows: above, a log is streamed
 PIECE = 1 << 16  # rows
@@ -65,6 +66,8 @@ class LogStream:
 def is_big(path: Path) -> bool:
     """Whether a log is to be streamed. False also of what cannot be read, for `read_log` to say why."""
     try:
+        if not path.is_file():
+            return False
         if path.suffix.lower() == ".parquet":
             return pa_parquet.read_metadata(path).num_rows > BIG_PARQUET
         return path.suffix.lower() == ".csv" and path.stat().st_size > BIG_CSV
@@ -102,6 +105,7 @@ def _scan(stream: LogStream, tick: Tick) -> list[dict[str, np.ndarray]]:
         log = Log(piece, stream.path, "")
         if last is not None and "t_s" in piece:
             check_time(Log({"t_s": np.array([last, piece["t_s"][0]])}, stream.path, ""), stream.rows - 1)
+        check_size(log, stream.rows)
         check_time(log, stream.rows)
         check_state(log, stream.rows)
         if "t_s" in piece:
@@ -123,23 +127,31 @@ def _scan(stream: LogStream, tick: Tick) -> list[dict[str, np.ndarray]]:
 
 def _names(path: Path) -> tuple[list[str], dict[str, Any]]:
     if path.suffix.lower() == ".parquet":
-        schema = pa_parquet.read_schema(path)
-        return list(schema.names), meta_of(schema)
+        try:
+            claimed = pa_parquet.read_metadata(path)
+            check_claims(claimed, path.stat().st_size, path)
+            schema = claimed.schema.to_arrow_schema()
+            return list(schema.names), checked_meta(meta_of(schema), path)
+        except BAD_PARQUET as error:
+            raise InputError(must("the log", "a Parquet file", short(error), path)) from None
     with path.open("rb") as file:
-        return header_of(file.readline(), path), {}
+        return header_of(file.readline(LONGEST_HEADER + 1), path), {}
 
 
 def _parquet(path: Path, names: list[str], dropped: list[int]) -> Iterator[dict[str, np.ndarray]]:
-    with pa_parquet.ParquetFile(path, pre_buffer=False) as file:
-        for batch in file.iter_batches(PIECE, columns=names):
-            yield _floats(batch, path)
+    try:
+        with pa_parquet.ParquetFile(path, pre_buffer=False) as file:
+            for batch in file.iter_batches(PIECE, columns=names):
+                yield _floats(batch, path)
+    except BAD_PARQUET as error:
+        raise InputError(must("the log", "a Parquet file", short(error), path)) from None
 
 
 def _csv(path: Path, names: list[str], dropped: list[int]) -> Iterator[dict[str, np.ndarray]]:
     types = dict.fromkeys(names, pa.float64())
     convert = pa_csv.ConvertOptions(column_types=types, include_columns=names, null_values=NULLS)
     with path.open("rb") as file:
-        listed = header_of(file.readline(), path)
+        listed = header_of(file.readline(LONGEST_HEADER + 1), path)
     parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(1) or "skip")
     read = pa_csv.ReadOptions(block_size=BLOCK, skip_rows=1, column_names=listed)
     try:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import tomlkit
+import tomlkit.exceptions
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from barberpole.errors import InputError, must
@@ -78,7 +79,11 @@ def write_model(model: ModelFile, path: str | Path) -> None:
 
 def model_text(model: ModelFile, path: Path, text: str = "") -> str:
     """The file's text: `text` with effects, plugins and sensor brought up to date, or a new one."""
-    document = tomlkit.parse(text)
+    try:
+        document = tomlkit.parse(text)
+    except (tomlkit.exceptions.TOMLKitError, ValueError, RecursionError) as error:  # it takes less than tomllib
+        got = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(must("the model file", "TOML that can be kept as it was written", got, path)) from None
     _update_list(document, "effects", model.effects)
     if model.plugins or "plugins" in document:
         _update_list(document, "plugins", [relative(plugin, path.parent) for plugin in model.plugins])

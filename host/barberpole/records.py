@@ -16,6 +16,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from barberpole.frame_content import fault
+
 HEADER, ROWS, EVENT, RUN, POINTS, RESULT, ANSWER = "H", "D", "E", "T", "P", "S", "A"
 TYPES = frozenset((HEADER, ROWS, EVENT, RUN, POINTS, RESULT, ANSWER))
 JSON_TYPES = frozenset((HEADER, EVENT, RUN, RESULT, ANSWER))
@@ -153,4 +155,6 @@ def _typed(kind: str, sequence: int, payload: bytes) -> Frame | None:
         content = json.loads(payload)
     except (ValueError, RecursionError):
         return None
-    return Frame(kind, sequence, payload, content) if isinstance(content, dict) else None
+    if not isinstance(content, dict) or (kind != HEADER and fault(kind, content)):
+        return None  # a header that is wrong in itself is told by whoever reads the record
+    return Frame(kind, sequence, payload, content)

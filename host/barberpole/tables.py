@@ -34,8 +34,8 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     """Parsed TOML of a file. `what` names it in errors ("the board file"). Raises InputError."""
     try:
         return tomllib.loads(read_text(path, what))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(must(what, "valid TOML", error, path)) from None
+    except ValueError as error:  # a number of more digits than Python takes is one too
+        raise InputError(must(what, "valid TOML", str(error).partition(";")[0], path)) from None
     except RecursionError:
         raise InputError(must(what, "valid TOML", "brackets within brackets, too deep to read", path)) from None
 

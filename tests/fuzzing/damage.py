@@ -1,12 +1,12 @@
 """What happens to files: bits flip, ends are lost, parts come twice, out of order or from elsewhere; numbers grow."""
 
+import random
 import re
 from collections.abc import Callable
 
-from hypothesis import strategies as st
-
 LARGEST = 200_000  # bytes of a damaged file: small, whatever it claims
 NUMBER = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?")
+WORD = re.compile(rb'"[^"\n]*"|[\w.]+')
 WORDS = (
     b"nan inf -inf 1e999 -1e308 1e-320 0 -0 1000000000 99999999999999999999 0x10 1_000 true null {} [] "
     b"\"\" \xff\xfe \x00 \xef\xbb\xbf \r \n\n , ; = . # [[ ]] ''' \"\"\" $ __import__('os') %s {0} "
@@ -80,6 +80,34 @@ def deep(data: bytes, at: int, how: int) -> bytes:
     return data + b"\na = " + b"[" * (1 + how % 5000) + (b"]" * (1 + how % 5000) if at % 2 else b"")
 
 
+def other_lines(data: bytes, at: int, how: int) -> bytes:
+    """Written by another machine: line ends, byte order marks, UTF-16."""
+    return (
+        data.replace(b"\n", b"\r\n"),
+        data.replace(b"\n", b"\r"),
+        b"\xef\xbb\xbf" + data,
+        data.decode("latin-1").encode("utf-16"),
+    )[how % 4]
+
+
+def many_digits(data: bytes, at: int, how: int) -> bytes:
+    """One of the numbers has more digits than anybody can measure."""
+    found = list(NUMBER.finditer(data))
+    if not found:
+        return data
+    one = found[at % len(found)]
+    return data[: one.end()] + b"7" * (how % LARGEST) + data[one.end() :]
+
+
+def other_word(data: bytes, at: int, how: int) -> bytes:
+    """One of the words stands where another stood."""
+    found = list(WORD.finditer(data))
+    if not found:
+        return data
+    one, other = found[at % len(found)], found[how % len(found)]
+    return data[: one.start()] + other[0] + data[one.end() :]
+
+
 DAMAGES: tuple[Damage, ...] = (
     flip_bit,
     flip_bit,
@@ -96,13 +124,17 @@ DAMAGES: tuple[Damage, ...] = (
     without_line,
     many_columns,
     deep,
+    other_lines,
+    many_digits,
+    other_word,
+    other_word,
 )
-one = st.tuples(st.sampled_from(DAMAGES), st.integers(0, 1 << 20), st.integers(0, 1 << 20))
-damages = st.lists(one, min_size=1, max_size=4)
+MOST = 4  # things that happen to one file
+ANYWHERE = 1 << 20
 
 
-def damaged(data: bytes, how: list[tuple[Damage, int, int]]) -> bytes:
-    """The file after all of it."""
-    for do, at, size in how:
-        data = do(data, at, size)[:LARGEST]
+def damaged(data: bytes, rng: random.Random) -> bytes:
+    """The file after one to four of them."""
+    for _ in range(rng.randint(1, MOST)):
+        data = rng.choice(DAMAGES)(data, rng.randrange(ANYWHERE), rng.randrange(ANYWHERE))[:LARGEST]
     return data

@@ -1,97 +1,152 @@
 """Good files of every kind that barberpole reads, small, and the commands that read them."""
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from barberpole.calibrating import calibration_of
-from barberpole.calibration import write_calibration
-from barberpole.challenge.record import Recipe, record
-from barberpole.fit.fit import fit_log
-from barberpole.log import Log, read_log, write_log
-from barberpole.modelfile import read_model
+from barberpole.challenge.game import _seal
 from barberpole.paths import boards
 from barberpole.plugins import TEMPLATE
-from barberpole.records import POINT, encode, encode_json
 
-ROWS = 80
-MODEL = """effects = ["bias", "scale", "misalignment"]
-reference = { magnitude_ut = 50.0, temp_c = 25.0 }
+from fuzzing.many import with_meta, write_array, write_fleet
+from fuzzing.one import DRIVER, HEADER, driver_records, header_text, records, write_logs
+
+LINEAR = "bias,scale,misalignment"
+MODEL = b"""effects = ["bias", "scale", "misalignment", "cross_field"]
+reference = { kind = "vector", temp_c = 25.0 }
 sensor = "hmc1021_1022"
 plugins = []
 
 [cross_field]
-form = "each"
+form = "demodulated"
 """
-LINEAR = "bias,scale,misalignment"
+PLUGGED = b'effects = ["bias", "scale", "mine"]\nplugins = ["mine.py"]\n'
+
+ANY = (f"fit FILE --model {LINEAR} --json", "convert FILE -o OUT.csv", "summary FILE", f"compare FILE --model {LINEAR}")
+FIELD = (
+    *ANY,
+    f"fit FILE --model {LINEAR},cross_field,drift,outliers",
+    f"diagnose FILE --model {LINEAR} --json",
+    f"diagnose FILE @field.csv --model {LINEAR}",
+    "fit FILE --method linear",
+    "fit FILE --method polynomial --json",
+    "trajectory pybv11 --shape replay --points 20 --log FILE",
+    f"add lag FILE --model {LINEAR}",
+)
+MAGNITUDE = (
+    *ANY,
+    "fit FILE --method ellipsoid",
+    "fit FILE --method ellipsoid_algebraic --json",
+    "fit FILE --method iterative",
+    f"diagnose FILE --model {LINEAR}",
+)
+STILL = (
+    "verify FILE --calibration @good.toml --json",
+    "characterise FILE",
+    f"diagnose @field.csv --model {LINEAR} --noise FILE",
+)
+BOARD_LOG = (*ANY, "fit FILE --method ellipsoid", "verify FILE --calibration @good.toml --json")
+BOARD = ("board check FILE", "design flip FILE", "design noise FILE", "trajectory FILE --json", "build FILE -o OUT.dir")
+CALIBRATION = (
+    "verify @still.csv --calibration FILE --json",
+    "verify @still.csv --calibration FILE",
+    "build pybv11 --calibration FILE -o OUT.dir --json",
+)
+FLEET = ("fleet report FILE --json", "fleet common FILE", "fleet extract FILE board1 -o OUT.toml")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of file: its name, a good one, and command lines in which FILE stands for it, GOOD for a good log.
+    """One kind of file: its name, a good one, and command lines in which FILE stands for it, @NAME for a good file.
 
     wrapped: what is put around the damaged part, so that no checksum catches the damage.
+    beside: other files in its folder, which is HERE.
     """
 
     name: str
     good: bytes
     commands: tuple[str, ...]
     wrapped: Callable[[bytes], bytes] = bytes
+    beside: dict[str, bytes] = field(default_factory=dict)
 
 
 def kinds(folder: Path) -> list[Kind]:
     """All kinds; the good files lie in `folder`."""
-    columns = record(Recipe({}, rows=ROWS, form="demodulated", seed=1))
-    log = Log(columns, folder / "good.csv", "0" * 64)
-    write_log(log, log.path)
-    write_log(log, folder / "good.parquet")
-    good = read_log(log.path)
-    file = read_model(LINEAR)
-    write_calibration(calibration_of(fit_log(good, file), good, file), folder / "good.toml")
-    (folder / "good_plugin.py").write_text(TEMPLATE.read_text().replace("NAME", "mine"))
-    header, sensor = json.dumps(HEADER).encode(), (boards() / "sensors" / "hmc1021_1022.toml").read_bytes()
+    write_logs(folder, LINEAR)
+    return [*_logs(folder), *_records(folder), *_boards(), *_models(folder), *_many(folder)]
+
+
+def _logs(folder: Path) -> list[Kind]:
+    def read(name: str) -> bytes:
+        return (folder / name).read_bytes()
+
     return [
-        Kind("log.csv", log.path.read_bytes(), LOG),
-        Kind("log.parquet", (folder / "good.parquet").read_bytes(), LOG[:3]),
-        Kind("log.bpr", records(columns, header), BOARD_LOG),
-        Kind("header.bpr", header, BOARD_LOG, partial(records, columns)),
-        Kind("board.toml", (boards() / "pybv11.toml").read_bytes(), ("board check FILE",)),
-        Kind("sensor.toml", sensor, (f"fit GOOD --model {LINEAR} --sensor FILE",)),
-        Kind("model.toml", MODEL.encode(), ("fit GOOD --model FILE --json", "remove scale GOOD --model FILE")),
-        Kind("calibration.toml", (folder / "good.toml").read_bytes(), ("verify GOOD --calibration FILE --json",)),
-        Kind("mine.py", (folder / "good_plugin.py").read_bytes(), ("fit GOOD --model PLUGGED --json",)),
+        Kind("field.csv", read("field.csv"), FIELD),
+        Kind("turned.csv", read("turned.csv"), MAGNITUDE),
+        Kind("still.csv", read("still.csv"), STILL),
+        Kind("pairs.csv", read("pairs.csv"), (*ANY, "fit FILE --method polynomial --json", "characterise FILE --json")),
+        Kind("field.parquet", read("field.parquet"), ANY),
     ]
 
 
-LOG = (
-    f"fit FILE --model {LINEAR} --json",
-    "convert FILE -o OUT.csv",
-    "fit FILE --method ellipsoid",
-    f"compare FILE --model {LINEAR}",
-    "summary FILE",
-    f"fit FILE --model {LINEAR},cross_field,drift,outliers",
-)
+def _records(folder: Path) -> list[Kind]:
+    header, driver, board = header_text(HEADER), header_text(DRIVER), records(folder)
+    driving = ("imcs @in_coils.csv FILE -o OUT.csv",)
+    return [
+        Kind("log.bpr", board(header), BOARD_LOG),
+        Kind("header.bpr", header, BOARD_LOG, board),
+        Kind("driver.bpr", driver_records(driver), driving),
+        Kind("driver-header.bpr", driver, driving, driver_records),
+    ]
 
 
-BOARD_LOG = (*LOG[:3], "verify FILE --calibration GOODCAL --json", "summary FILE")
-HEADER: dict[str, Any] = {
-    "format": 1,
-    "board": "pybv11",
-    "sensor": "hmc1021_1022",
-    "columns": [["t_s", "f", 1.0], ["x_lsb", "f", 1.0], ["y_lsb", "f", 1.0], ["z_lsb", "f", 1.0], ["temp_c", "f", 1.0]],
-    "polarity": "raw",
-}
+def _boards() -> list[Kind]:
+    def read(name: str) -> bytes:
+        return (boards() / name).read_bytes()
+
+    array = ("array calibrate @array-turned.csv --array FILE -o OUT.toml", "board check FILE")
+    sensor = (f"fit @field.csv --model {LINEAR} --sensor FILE", f"diagnose @field.csv --model {LINEAR} --sensor FILE")
+    return [
+        Kind("board.toml", read("pybv11.toml"), BOARD),
+        Kind("timed.toml", read("nucleo_f446re.toml"), BOARD),
+        Kind("driver.toml", read("drivers/imcs_driver.toml"), ("build FILE -o OUT.dir --json",)),
+        Kind("array.toml", read("arrays/gradiometer.toml"), array),
+        Kind("sensor.toml", read("sensors/hmc1021_1022.toml"), sensor),
+        Kind("digital.toml", read("sensors/lis3mdl.toml"), sensor),
+    ]
 
 
-def records(columns: dict[str, np.ndarray], header: bytes) -> bytes:
-    """What a board streams: a header, rows, an event, a coil run."""
-    out = [encode("H", 0, header), encode_json("E", 1, {"kind": "boot", "boot": 1})]
-    rows = np.stack([columns[name] for name, _, _ in HEADER["columns"]], axis=1).astype("<f4")
-    out += [encode("D", 2 + at, row.tobytes()) for at, row in enumerate(rows)]
-    out += [encode_json("T", 100, {"points": 12, "trajectory": "a", "unit_ma": 5.0})]
-    out += [encode("P", 101 + at, POINT.pack(at, *np.arange(13.0))) for at in range(12)]
-    return b"".join([*out, encode_json("S", 120, {"pass": True})])
+def _models(folder: Path) -> list[Kind]:
+    log = "@field.csv --model FILE"
+    model = (f"fit {log} --json", f"remove scale {log}", f"add lag {log}", f"diagnose {log}")
+    plugin = TEMPLATE.read_text().replace("NAME", "mine").encode()
+    plugged = tuple(f"{do} @field.csv --model HERE/plugged.toml" for do in ("fit", "diagnose"))
+    game = {
+        "log.csv": (folder / "field.csv").read_bytes(),
+        "model.toml": b'effects = ["bias", "scale", "misalignment"]',
+    }
+    sealed = _seal({"hidden": ["lag"], "level": 1})
+    return [
+        Kind("model.toml", MODEL, model),
+        Kind("calibration.toml", (folder / "good.toml").read_bytes(), CALIBRATION),
+        Kind("mine.py", plugin, plugged, beside={"plugged.toml": PLUGGED}),
+        Kind("answer.sealed", sealed, ("challenge answer HERE lag",), beside=game),
+    ]
+
+
+def _many(folder: Path) -> list[Kind]:
+    write_array(folder)
+    meta = write_fleet(folder, LINEAR)
+
+    def read(name: str) -> bytes:
+        return (folder / name).read_bytes()
+
+    gradient, using = "array gradient {} --calibration {} --json", "--calibration @array.toml"
+    return [
+        Kind("array-turned.csv", read("array-turned.csv"), ("array calibrate FILE -o OUT.toml",)),
+        Kind("array-run.csv", read("array-run.csv"), (f"array selfcal FILE {using} -o OUT.toml",)),
+        Kind("array-seen.csv", read("array-seen.csv"), (gradient.format("FILE", "@array.toml"),)),
+        Kind("array-cal.toml", read("array.toml"), (gradient.format("@array-seen.csv", "FILE"),)),
+        Kind("fleet.parquet", read("fleet.parquet"), FLEET),
+        Kind("fleet-meta.parquet", meta, FLEET, with_meta(folder / "fleet.parquet")),
+    ]

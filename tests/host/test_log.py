@@ -137,7 +137,7 @@ def test_bit_flip_reads_or_says_one_sentence(tmp_path_factory, bit):
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
-@given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=20))
+@given(values=st.lists(st.floats(-1e30, 1e30), min_size=1, max_size=20))
 def test_round_trip_is_exact(tmp_path_factory, ending, values):
     folder = tmp_path_factory.mktemp("trip")
     rows = "".join(f"{value!r},1,2\n" for value in values)

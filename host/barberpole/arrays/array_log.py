@@ -16,6 +16,7 @@ from barberpole.board_log import read_board_log
 from barberpole.columns import READINGS, RESET, SET
 from barberpole.errors import InputError, must
 from barberpole.files import read_bytes
+from barberpole.frame_content import checked_meta
 from barberpole.log import Log, checked, file_sha256
 from barberpole.log_formats import read_csv, read_parquet
 
@@ -50,7 +51,7 @@ def _columns(data: bytes, path: Path) -> tuple[dict[str, np.ndarray], tuple[str,
         return columns, tuple(notes), dropped, {}
     if suffix == ".parquet":
         columns, notes, meta = read_parquet(data, path, readings=False)
-        return columns, tuple(notes), 0, meta
+        return columns, tuple(notes), 0, checked_meta(meta, path)
     if suffix == ".bpr":
         found = read_board_log(data, path)
         return found.columns, found.notes, found.skipped, found.meta

@@ -18,10 +18,11 @@ from barberpole.files import read_bytes, write_atomic
 from barberpole.fleet import journal
 from barberpole.fleet.identity import identity
 from barberpole.fleet.settings import Settings
+from barberpole.fleet.trusted import FORMAT, WHAT, check_columns, check_row, checked_meta
+from barberpole.log_formats import BAD_PARQUET, check_claims
 from barberpole.modelfile import ModelFile
 
 Row = dict[str, Any]
-FORMAT = 1
 META = b"barberpole_fleet"
 FIRST = ("log", "board", "lot", "date", "log_sha256", "status", "reason", "n")
 TYPES = {
@@ -134,15 +135,21 @@ def read_fleet(path: str | Path) -> Fleet:
     if not path.exists() and partly.exists():
         raise InputError(must("the fleet", "one that is finished (start the same run again)", partly.name, path))
     data = read_bytes(path, "the fleet's file")
-    try:
-        table = pa_parquet.read_table(pa.BufferReader(data))
-        meta = json.loads((table.schema.metadata or {})[META])
-    except (ValueError, OSError, KeyError):
-        raise InputError(must("the fleet's file", "one that `barberpole fleet` wrote", "another file", path)) from None
-    if meta.get("format") != FORMAT:
-        raise InputError(must("the fleet's file", f"of format {FORMAT}", f"format {meta.get('format')}", path))
-    rows = [_folded(row, meta["units"]) for row in table.to_pylist()]
+    table, meta = _table_of(data, path)
+    rows = [_folded(row, meta["units"], path) for row in table.to_pylist()]
     return Fleet(rows, meta["do"], meta, path, hashlib.sha256(data).hexdigest())
+
+
+def _table_of(data: bytes, path: Path) -> tuple[pa.Table, dict[str, Any]]:
+    try:
+        check_claims(pa_parquet.read_metadata(pa.BufferReader(data)), len(data), path)
+        table = pa_parquet.read_table(pa.BufferReader(data))
+        said = json.loads((table.schema.metadata or {})[META])
+    except (*BAD_PARQUET, KeyError):
+        raise InputError(must(WHAT, "one that `barberpole fleet` wrote", "another file", path)) from None
+    meta = checked_meta(said, path)
+    check_columns(table.schema, meta["units"], _type, path)
+    return table, meta
 
 
 def _named(row: Row, settings: Settings) -> Row:
@@ -162,16 +169,27 @@ def _flat(row: Row) -> Row:
     return flat
 
 
-def _folded(row: Row, units: dict[str, str]) -> Row:
-    """A row of the file as it was in the journal, with board, lot and date."""
+def _folded(row: Row, units: dict[str, str], where: Path) -> Row:
+    """A row of the file as it was in the journal, with board, lot and date. Raises InputError."""
+    check_row(row, units, where)
     wide = {column for name in units for column in (name, f"{name}_stderr")}
     out = {key: value for key, value in row.items() if key not in wide and value is not None}
     names = row.get("parameters") or []
-    out["told"] = json.loads(row["told"])
+    out["told"] = _told(row["told"], where)
     if names:
         out["parameters"] = {name: [row[name], row[f"{name}_stderr"]] for name in names}
         out["units"] = {name: units[name] for name in names}
     return {"date": None, "reason": None, "log_sha256": None} | out
+
+
+def _told(text: str, where: Path) -> dict[str, str]:
+    try:
+        told = json.loads(text)
+    except (ValueError, RecursionError):
+        told = None
+    if not isinstance(told, dict):
+        raise InputError(must(f"what a row of {WHAT} was told", "a table in JSON", "another text", where))
+    return told
 
 
 def _table(rows: list[Row], parameters: list[str]) -> pa.Table:

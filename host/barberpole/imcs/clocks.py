@@ -19,9 +19,12 @@ from barberpole.imcs.driven import Driven
 STRETCH_S = 10.0  # of rows for one shift: two crystals part by a millisecond or two in it
 LONG_S = 6.0 * STRETCH_S  # of a log whose drift can be seen, and matters
 MOST_ROWS = 300  # of the search over all shifts
+FEWEST_ROWS = 8  # of those
+MOST_SHIFTS = 200_000  # of a quarter point: half a day of points of one second has as many
 CANDIDATES = 6  # whole turns of the driver among them
 SAME = 0.03  # of the variance, by which one turn's shift may be worse than another's
 FINE_S = 2e-4
+MOST_FINE = 5000  # of those within a point
 PLATEAU = 1.02  # times the least, that is still the plateau
 IN_COMMON = 0.5  # of the rows, that a shift must lay within the driver's record
 FOLLOWED = 0.3  # of the variance that may be left; a sensor in the coils leaves what rows at steps do, some per cent
@@ -49,6 +52,8 @@ def agree(y: np.ndarray, t_s: np.ndarray, driven: Driven, where: object) -> Cloc
     shift = _fine(y, t_s, driven, rows, _coarse(y, t_s, driven, rows))
     drift = 0.0
     common = np.flatnonzero((t_s + shift >= driven.from_s[0]) & (t_s + shift <= driven.to_s[-1]))
+    if not common.size:
+        raise InputError(must("the readings", "such as follow the driver's currents", "none at the best shift", where))
     if t_s[common[-1]] - t_s[common[0]] > LONG_S:
         drift, shift = _drift(y, t_s, driven, shift, common)
         shift += drift * (middle - 0.5 * float(t_s[common[0]] + t_s[common[-1]]))
@@ -65,8 +70,14 @@ def _stretch(t_s: np.ndarray, about_s: float) -> np.ndarray:
 
 def _coarse(y: np.ndarray, t_s: np.ndarray, driven: Driven, rows: np.ndarray) -> float:
     """The best shift of all, to a quarter of a point."""
+    if rows.size < FEWEST_ROWS:
+        got = f"{rows.size} within {STRETCH_S:g} s"
+        raise InputError(must("the log", f"one with {FEWEST_ROWS} rows about its middle", got, driven.path))
     few = rows[:: -(-rows.size // MOST_ROWS)]
     first, last = driven.from_s[0] - t_s[few[-1]], driven.to_s[-1] - t_s[few[0]]
+    if not 0 < 4.0 * (last - first) / driven.pitch_s < MOST_SHIFTS:
+        got = f"{last - first:.4g} s of rows and points, {driven.pitch_s:.4g} s a point"
+        raise InputError(must("log and record", "of one day, with points of one length", got, driven.path))
     shifts = np.arange(first, last, 0.25 * driven.pitch_s)
     left = np.array([_left(y[:, few], t_s[few] + s, driven) for s in shifts])
     tried = [_fine(y, t_s, driven, few, shift) for shift in _lowest(shifts, left, driven.pitch_s)]
@@ -94,7 +105,8 @@ def _common_s(t_s: np.ndarray, driven: Driven, shift: float) -> float:
 
 def _fine(y: np.ndarray, t_s: np.ndarray, driven: Driven, rows: np.ndarray, about_s: float) -> float:
     """The middle of the plateau near a shift."""
-    shifts = about_s + np.arange(-0.5 * driven.pitch_s, 0.5 * driven.pitch_s, FINE_S)
+    step_s = max(FINE_S, driven.pitch_s / MOST_FINE)
+    shifts = about_s + np.arange(-0.5 * driven.pitch_s, 0.5 * driven.pitch_s, step_s)
     left = np.array([_left(y[:, rows], t_s[rows] + s, driven) for s in shifts])
     least = int(np.argmin(left))
     flat = left <= PLATEAU * left[least] + 1e-9
@@ -118,7 +130,7 @@ def _left(y: np.ndarray, driver_s: np.ndarray, driven: Driven) -> float:
     rows lie within the record."""
     hold = np.searchsorted(driven.to_s, driver_s)  # the field steps where a hold ends
     there = (driver_s >= driven.from_s[0]) & (hold < driven.to_s.size)
-    if there.sum() < IN_COMMON * there.size or there.sum() < 8:
+    if there.sum() < IN_COMMON * there.size or there.sum() < FEWEST_ROWS:
         return 1.0
     i, h = driven.current_ma[:, hold[there]], y[:, there]
     i, h = i - i.mean(axis=1, keepdims=True), h - h.mean(axis=1, keepdims=True)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from barberpole.errors import InputError, must
 from barberpole.files import read_bytes
 
 FEWEST_POINTS = 12
+TIMES = ("t_s", "from_s", "to_s")
+
+Columns = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ def read_driven(path: str | Path) -> Driven:
     found = read_board_log(read_bytes(path, "the driver's record"), path)
     if found.meta.get("role") != ROLE:
         raise InputError(must("the driver's record", "one of a coil driver", "one of a sensor board", path))
-    columns = found.columns
+    columns = _checked(found.columns, found.meta, path)
     count = len(columns["t_s"])
     if count < FEWEST_POINTS:
         raise InputError(must("the driver's record", f"one of {FEWEST_POINTS} points or more", count, path))
@@ -55,3 +59,17 @@ def read_driven(path: str | Path) -> Driven:
         path,
         (*found.notes, *events),
     )
+
+
+def _checked(columns: Columns, meta: dict[str, Any], path: Path) -> Columns:
+    """The columns, where all that a driver says is there, in numbers, one point after the other."""
+    lacking = [name for name in (*TIMES, *CURRENT) if name not in columns]
+    lacking += [] if "ut_per_ma" in meta else ["ut_per_ma"]
+    if lacking:
+        raise InputError(must("the driver's record", f"one with {', '.join(lacking)}", "none", path))
+    if not all(np.all(np.isfinite(columns[name])) for name in (*TIMES, *CURRENT)):
+        raise InputError(must("the driver's record", "one of numbers", "a point without", path))
+    after = np.diff(columns["from_s"]) > 0
+    if not (np.all(after) and np.all(columns["to_s"] > columns["from_s"]) and np.all(np.diff(columns["to_s"]) > 0)):
+        raise InputError(must("the driver's record", "one of points held one after the other", "another order", path))
+    return columns

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from barberpole.board_log import CODES
 from barberpole.errors import PortError, must
+from barberpole.frame_content import fault, layout_of
 from barberpole.link.listen import Listener
 from barberpole.reasons import TABLE
 from barberpole.records import EVENT, HEADER, RESULT, ROWS, Frame
@@ -59,7 +59,7 @@ class _Heard:
     def take(self, frame: Frame) -> None:
         content = frame.json or {}
         if frame.type == HEADER:
-            self.header = content
+            self.header = content if not fault(HEADER, content) else self.header
         elif frame.type == RESULT:
             self.verdict = content
         elif frame.type == EVENT:
@@ -70,11 +70,9 @@ class _Heard:
 
     def table(self) -> np.ndarray | None:
         """Rows as a structured array, unscaled; None where there are none or no header has named the columns."""
-        layout = self.header.get("columns")
-        if not layout or not self.rows:
-            return None
-        kind = np.dtype([(name, CODES[code]) for name, code, _ in layout])
-        return np.frombuffer(b"".join(row for row in self.rows if len(row) == kind.itemsize), kind)
+        kind = layout_of(self.header)
+        whole = b"" if kind is None else b"".join(row for row in self.rows if len(row) == kind.itemsize)
+        return np.frombuffer(whole, kind) if whole else None
 
 
 def seconds(board: Listener, interval_s: float = 1.0) -> Iterator[Second]:
@@ -101,7 +99,7 @@ def seconds(board: Listener, interval_s: float = 1.0) -> Iterator[Second]:
 
 def _second(heard: _Heard, lost: int) -> Second:
     table = heard.table()
-    scales = {name: scale for name, _, scale in heard.header["columns"]}
+    scales = {name: scale for name, _, scale in heard.header.get("columns", [])}
 
     def column(name: str) -> np.ndarray:
         return table[name] * float(scales[name]) if table is not None and name in scales else np.array([math.nan])

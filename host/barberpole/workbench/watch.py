@@ -15,8 +15,8 @@ from typing import Any, BinaryIO
 import numpy as np
 import serial
 
-from barberpole.board_log import CODES
 from barberpole.errors import BarberpoleError, PortError, must
+from barberpole.frame_content import fault, layout_of
 from barberpole.link.mpremote import require_port
 from barberpole.link.record import RESTART
 from barberpole.records import ANSWER, EVENT, HEADER, RESULT, ROWS, Decoder, Frame
@@ -193,8 +193,9 @@ class Watch:
         rows = []
         for frame in frames:
             if frame.type == HEADER:
-                self.header = frame.json or {}
-                self._kind = np.dtype([(name, CODES[code]) for name, code, _ in self.header.get("columns", [])])
+                if not fault(HEADER, frame.json or {}):
+                    self.header = frame.json or {}
+                    self._kind = layout_of(self.header)
             elif frame.type == RESULT:
                 self.verdict = frame.json or {}
             elif frame.type == EVENT:
@@ -203,7 +204,7 @@ class Watch:
                 self.answer = frame.json or {}
             elif frame.type == ROWS and self._kind is not None and len(frame.payload) % self._kind.itemsize == 0:
                 rows.append(frame.payload)
-        if rows and self._kind is not None:
+        if any(rows) and self._kind is not None:
             self._put(np.frombuffer(b"".join(rows), self._kind))
 
     def _put(self, table: np.ndarray) -> None:
