@@ -15,6 +15,7 @@ from barberpole.commands import (
     array,
     board,
     board_check,
+    boards,
     calibrate,
     catalogue,
     challenge,
@@ -47,7 +48,7 @@ app = typer.Typer(
 PANELS = {
     "A log and its model": (calibrate, catalogue, methods, challenge),
     "See it": (report, workbench),
-    "A board": (demo, board, board_check, live, trajectory, imcs, array),
+    "A board": (demo, board, boards, board_check, live, trajectory, imcs, array),
     "A kind of sensor, and the apparatus": (characterise, design),
     "Many boards": (fleet,),
     "This machine": (doctor,),

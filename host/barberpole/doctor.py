@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from importlib import metadata
 
 from barberpole import paths
+from barberpole.errors import InputError
 
 DISTRIBUTION = "barberpole"
 SERVES = {  # what an optional part of the package is for
@@ -32,6 +33,10 @@ class Finding:
     found: str
     needed: bool
     serves: str
+    extra: str = ""
+    """Of a package that only an optional part asks for: the name of that part."""
+    requirement: str = ""
+    """Of a package: what pip is told to install it."""
 
     def to_json(self) -> dict:
         """As plain values."""
@@ -40,18 +45,40 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Everything, needed things first."""
-    found = [_python(), *_packages(), *_tools(), _boards(), _ports()]
+    found = [_python(), *_packages(), *_tools(), _boards(), _micropython(), _ports()]
     return sorted(found, key=lambda finding: not finding.needed)
 
 
+def by_extra(findings: list[Finding]) -> list[Finding]:
+    """The packages of each optional part as one finding, after the others."""
+    parts = dict.fromkeys(finding.extra for finding in findings if finding.extra)
+    alone = [finding for finding in findings if not finding.extra]
+    return alone + [_part(name, [finding for finding in findings if finding.extra == name]) for name in parts]
+
+
+def _part(name: str, packages: list[Finding]) -> Finding:
+    lacking = [package.requirement for package in packages if not package.ok]
+    found = f"without {', '.join(lacking)}" if lacking else "installed"
+    return Finding(f"extra {name}", not lacking, found, False, packages[0].serves)
+
+
+def remedy(lacking: list[Finding]) -> str:
+    """The command that installs those findings that are packages, '' where none is."""
+    asked = [f"'{finding.requirement}'" for finding in lacking if finding.requirement]
+    return f"python -m pip install {' '.join(asked)}" if asked else ""
+
+
 def _python() -> Finding:
-    wanted = metadata.metadata(DISTRIBUTION)["Requires-Python"] or ""
+    try:
+        wanted = metadata.metadata(DISTRIBUTION)["Requires-Python"] or ""
+    except metadata.PackageNotFoundError:
+        return Finding(DISTRIBUTION, False, "not installed: its packages cannot be looked up", True, "everything")
     have = ".".join(map(str, sys.version_info[:3]))
     return Finding(f"Python {wanted}", _at_least(have, wanted), have, True, "everything")
 
 
 def _packages() -> Iterator[Finding]:
-    for requirement in metadata.requires(DISTRIBUTION) or []:
+    for requirement in _requirements():
         wanted, _, condition = (part.strip() for part in requirement.partition(";"))
         name = re.match(r"[\w.-]+", wanted)
         extra = re.search(r"extra == ['\"](\w+)['\"]", condition)
@@ -63,7 +90,15 @@ def _packages() -> Iterator[Finding]:
             have = ""
         part = extra.group(1) if extra else ""
         serves = SERVES.get(part, part) if part else "everything"
-        yield Finding(wanted, bool(have) and _at_least(have, wanted), have or "not installed", not part, serves)
+        ok = bool(have) and _at_least(have, wanted)
+        yield Finding(wanted, ok, have or "not installed", not part, serves, part, wanted)
+
+
+def _requirements() -> list[str]:
+    try:
+        return metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        return []
 
 
 def _at_least(have: str, wanted: str) -> bool:
@@ -78,12 +113,26 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 def _tools() -> Iterator[Finding]:
     for name, (words, serves) in TOOLS.items():
-        try:
-            done = subprocess.run(words, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
-            said, ok = (done.stdout or done.stderr).strip().splitlines(), done.returncode == 0
-        except (OSError, subprocess.TimeoutExpired) as error:
-            said, ok = [str(error)], False
-        yield Finding(f"{name} runs", ok, said[-1] if said else "no answer", True, serves)
+        yield _runs(name, words, serves, True)
+
+
+def _runs(name: str, words: list[str], serves: str, needed: bool) -> Finding:
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+        said, ok = (done.stdout or done.stderr).strip().splitlines(), done.returncode == 0
+    except (OSError, subprocess.TimeoutExpired) as error:
+        said, ok = [str(error)], False
+    return Finding(f"{name} runs", ok, said[-1] if said else "no answer", needed, serves)
+
+
+def _micropython() -> Finding:
+    from barberpole.twin.interpreter import find_micropython
+
+    try:
+        words = [find_micropython(), "-c", "import sys; print(sys.version)"]
+    except InputError:
+        return Finding("micropython runs", False, "none", False, SERVES["twin"])
+    return _runs("micropython", words, SERVES["twin"], False)
 
 
 def _boards() -> Finding:

@@ -67,3 +67,14 @@ def test_alternate_functions_have_the_numbers_of_their_group():
                 assert number == second.get(function, {}).get(pin, column[function[:4]]), (name, function, pin)
     assert set(load_mcu("stm32f405").alternate["TIM1_CH1"]) < set(load_mcu("stm32f407").alternate["TIM1_CH1"])
     assert "PC1" not in load_mcu("stm32f405").alternate["SPI2_MOSI"]
+
+
+def test_boards_lists_every_file_by_the_name_that_commands_take(capsys):
+    assert run(["boards", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert {row["name"] for row in said["boards"] if row["role"] == "sensor"} == set(BOARDS)
+    assert {row["role"] for row in said["boards"]} == {"sensor", "array", "coil driver"}
+    assert said["sensors"] == sorted(path.stem for path in (paths.boards() / "sensors").glob("*.toml"))
+    assert all(row["mcu"].startswith("STM32F4") and row["adc"] for row in said["boards"])
+    assert run(["boards"]) == 0
+    assert str(paths.boards()) in capsys.readouterr().out

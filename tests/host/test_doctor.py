@@ -29,14 +29,39 @@ def test_a_missing_package_is_named(monkeypatch, capsys):
 
     monkeypatch.setattr(doctor.metadata, "version", without_scipy)
     assert run(["doctor"]) == 1
-    assert "missing: scipy>=" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "missing: scipy>=" in said
+    assert "python -m pip install 'scipy>=" in said
 
 
 def test_a_missing_extra_only_says_what_it_is_for(monkeypatch, capsys):
-    monkeypatch.setattr(doctor.metadata, "requires", lambda _: ["nothing-like-it>=1; extra == 'twin'"])
+    asked = ["nothing-like-it>=1; extra == 'twin'", "numpy>=1; extra == 'fleet'"]
+    monkeypatch.setattr(doctor.metadata, "requires", lambda _: asked)
     assert run(["doctor"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "nothing-like-it>=1 not here not installed the emulated board" in said
+    assert "extra fleet ok installed" in said
+    (part,) = [finding for finding in doctor.by_extra(doctor.examine()) if finding.what == "extra twin"]
+    assert (part.ok, part.needed, part.found) == (False, False, "without nothing-like-it>=1")
+    assert "need an emulated board: python -m pip install 'nothing-like-it>=1'" in said
+
+
+def test_a_tool_that_does_not_run_is_not_said_to_be_here(monkeypatch, tmp_path):
+    broken = tmp_path / "micropython"
+    broken.write_text("#!/bin/sh\nexit 3\n")
+    broken.chmod(0o755)
+    monkeypatch.setattr("barberpole.twin.interpreter.find_micropython", lambda: str(broken))
+    (found,) = [finding for finding in doctor.examine() if finding.what == "micropython runs"]
+    assert (found.ok, found.needed, found.found) == (False, False, "no answer")
+
+
+def test_without_its_own_metadata_it_says_that(monkeypatch, capsys):
+    def unknown(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor.metadata, "metadata", unknown)
+    monkeypatch.setattr(doctor.metadata, "requires", unknown)
+    assert run(["doctor"]) == 1
+    assert "missing: barberpole" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

