@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 STUBS := $(VENV)/stubs
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-.PHONY: trials coverage lines mutation fuzz release-check demo test lint bench soak docs pictures reproduce clean
+.PHONY: matrix trials coverage lines mutation fuzz release-check demo test lint bench soak docs pictures reproduce clean
 
 demo: $(STAMP)
 	@$(BIN)/barberpole demo
@@ -18,10 +18,15 @@ test: lint
 lint: $(STAMP) $(STUBS)/.installed
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check --quiet || { $(BIN)/ruff format --diff --quiet; echo "run: $(BIN)/ruff format"; exit 1; }
+	@$(BIN)/python tests/matrix.py compile
 	@$(BIN)/pyright --warnings
 	@$(BIN)/pyright --warnings --project firmware/pyrightconfig.json
 	@$(BIN)/pyright --warnings --project firmware/driver/pyrightconfig.json
 	@$(BIN)/pyright --warnings --project firmware/arrays/pyrightconfig.json
+
+# Every Python from 3.11 to 3.13 that is here, each in an environment of the lock file: ruff, pyright, the quick tests.
+matrix: $(STAMP)
+	@$(BIN)/python tests/matrix.py
 
 # Time, error and memory beside plain least squares and the peers; build/bench.json keeps them for the next run.
 bench: $(STAMP) $(VENV)/.bench
@@ -48,9 +53,9 @@ mutation: $(STAMP)
 fuzz: $(STAMP)
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m fuzzing.run --cases 10000
 
-# The wheel in an empty environment, without the repository: version, fit, demo; the source archive. Some minutes.
+# Source archive and wheel of what is committed; the wheel in an empty environment, without the repository. Two minutes.
 release-check: $(STAMP)
-	@$(BIN)/python -m pytest -m release tests/host/test_release.py
+	@$(BIN)/python -m pytest -m 'release or not release' tests/host/test_release.py
 
 docs: $(STAMP)
 	@$(BIN)/python -m barberpole.docs host/docs

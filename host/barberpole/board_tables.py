@@ -9,7 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from barberpole.sensor import PerAxis, Sensor
-from barberpole.tables import STRICT, Count, Fraction, Index, Integer, NotNegative, Number, Positive, Yes
+from barberpole.tables import STRICT, Count, Fraction, Index, Integer, Name, NotNegative, Number, Positive, Yes
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -219,7 +219,7 @@ class Member:
 class Board:
     """A board with its sensor. The keys of [board] stand here, the other tables are fields."""
 
-    name: str
+    name: Name
     """Name of the file without .toml."""
     mcu: str
     """Microcontroller."""

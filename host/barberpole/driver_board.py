@@ -17,7 +17,7 @@ from barberpole.board import find_file
 from barberpole.board_tables import Dac
 from barberpole.errors import InputError, LimitError, must
 from barberpole.sensor import PerAxis
-from barberpole.tables import STRICT, Count, Index, NotNegative, Positive, read_toml, unknown, validate
+from barberpole.tables import STRICT, Count, Index, Name, NotNegative, Positive, read_toml, unknown, validate
 
 ROLE = "coil_driver"
 TABLES = ("adc", "dac", "coils", "drive")
@@ -103,7 +103,7 @@ class Drive:
 class Driver:
     """A board that drives coils. The keys of [board] stand here, the other tables are fields."""
 
-    name: str
+    name: Name
     """Name of the file without .toml."""
     role: Literal["coil_driver"]
     """What the board is for."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
-from barberpole.tables import STRICT, Count, NotNegative, Number, Positive
+from barberpole.tables import STRICT, Count, Name, NotNegative, Number, Positive
 
 Axis = Literal["x", "y", "z"]
 Axes = tuple[Axis, Axis, Axis]
@@ -51,7 +51,7 @@ class Digital:
 class Sensor:
     """One family of AMR sensors: three bridges with their coils."""
 
-    name: str
+    name: Name
     """Name of the file without .toml."""
     technology: str
     """What kind of element it is, in words."""

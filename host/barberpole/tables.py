@@ -26,6 +26,10 @@ Count = Annotated[Integer, Field(gt=0)]
 Index = Annotated[Integer, Field(ge=0)]
 """A number is not taken from quotes, a whole number not from a fraction, a truth not from 0 or 1."""
 
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}$")]
+"""What a board, a sensor or an array is called. It becomes part of file names and of generated programs."""
+_NAME = "a name of at most 64 letters (a-z), digits, _, ., + or -"
+
 _UNKNOWN = frozenset({"unexpected_keyword_argument", "extra_forbidden"})
 _MISSING = frozenset({"missing", "missing_argument"})
 
@@ -104,5 +108,7 @@ def _sentence(kind: type, fault: Any, what: str, where: object, prefix: str) -> 
 
 def _expected(message: str) -> str:
     """What pydantic expects, as the end of "must be"."""
+    if message.startswith("String should match pattern"):
+        return _NAME
     wanted = message.removeprefix("Input should be ").removeprefix("Value error, ")
     return re.sub(r"^\w+ should have (.*) after validation.*", r"of \1", wanted)

@@ -1,5 +1,6 @@
 """The generated text against the accepted one, byte for byte."""
 
+import ast
 import difflib
 import functools
 from pathlib import Path
@@ -103,3 +104,14 @@ def test_brackets_keep_the_order_of_operations():
     numbers = 0.1, 0.7, 1e3
     assert namespace["f"](*numbers) == function(*numbers)
     assert namespace["N"] == 3
+
+
+@pytest.mark.parametrize("end", ["\n", "\r", "\x0c", "\u2028", "\x85"])
+def test_a_comment_ends_with_its_line_whatever_it_holds(end):
+    """Names out of a file stand in comments; nothing that follows one there becomes program text."""
+    bad = f"a{end}import os  "
+    function = Function("f", trace(lambda x: (2.0 * x,), ("x",)), (bad,))
+    text = module(bad, bad, bad, [bad], [Constant("A", bad, bad), Constant("B", b"ab", bad)], [function])
+    good = module("a", "a", "a", ["a"], [Constant("A", bad, "a"), Constant("B", b"ab", "a")], [function])
+    assert ast.dump(ast.parse(text)) == ast.dump(ast.parse(good))
+    assert len(text.splitlines()) == len(good.splitlines())

@@ -44,6 +44,13 @@ def test_shipped_board_passes_its_checks(name):
     assert load_board(name).name == name
 
 
+@pytest.mark.parametrize("name", ["../../elsewhere", "a\\nimport os", "", "a b", "x" * 65, "µ"])
+def test_a_name_is_no_path_and_no_program(tmp_path, name):
+    """It becomes part of file names and of the text of generated modules."""
+    said = str(refuse(tmp_path, TEXT.replace('name = "pybv11"', f'name = "{name}"')))
+    assert said.startswith("board.name must be a name of at most 64 letters (a-z), digits, _, ., + or -; got ")
+
+
 @pytest.mark.parametrize("name", [path.stem for path in (paths.boards() / "sensors").glob("*.toml")])
 def test_shipped_sensor(name):
     sensor = load_sensor(name)

@@ -20,7 +20,7 @@ from barberpole.board_checks import check_board
 from barberpole.board_tables import Member
 from barberpole.errors import InputError, must
 from barberpole.sensor import Sensor
-from barberpole.tables import STRICT, Yes, read_toml, validate
+from barberpole.tables import STRICT, Name, Yes, read_toml, validate
 
 NAME = re.compile(r"[a-z][a-z0-9]*")  # of a sensor: it begins the names of columns
 SAID = ("name", "sensor", "shielded")  # of a board, by [array]
@@ -30,7 +30,7 @@ SAID = ("name", "sensor", "shielded")  # of a board, by [array]
 class Array:
     """An array of equal sensors, their offset coils in series."""
 
-    name: str
+    name: Name
     """Name of the file without .toml."""
     sensor: str
     """Name of a sensor file."""
