@@ -81,7 +81,8 @@ def change(
         after = replace(after, settings=after.settings | {name: new.setups[name].settings})
     residual = new.problem.residual(new.p)
     found = _evidence(old, new, residual)
-    return Change(effect, old, new, after, noise_from_differences(residual), found, believed)
+    noise = examine(new, None, None, extra).background().rms(new.problem.n)
+    return Change(effect, old, new, after, noise, found, believed)
 
 
 def best_form(

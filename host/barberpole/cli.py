@@ -31,6 +31,7 @@ from barberpole.commands import (
     trajectory,
     workbench,
 )
+from barberpole.commands.console import ERR, say
 from barberpole.errors import BarberpoleError, must
 from barberpole.files import FULL, cannot_write
 
@@ -113,12 +114,12 @@ def run(arguments: list[str]) -> int:
 
 
 def _runs(plugin: Path) -> None:
-    print(f"barberpole: runs your own code in {plugin}, as the model file or the command line says", file=sys.stderr)
+    say(f"barberpole: runs your own code in {plugin}, as the model file or the command line says", console=ERR)
 
 
 def _refuse(sentence: str) -> int:
     if sentence.strip():  # none where a bare `barberpole` has shown its help
-        print(f"barberpole: {_printable(' '.join(sentence.split()))}", file=sys.stderr)
+        say(f"barberpole: {_printable(' '.join(sentence.split()))}", console=ERR)
     return BAD_INPUT
 
 

@@ -15,6 +15,9 @@ TRIPLES = (READINGS, SET, RESET, FIELD, CURRENT, COMPENSATED)
 SINGLES = ("t_s", "state", "b_ut", "temp_c", "load_a", "supply_v")
 KNOWN = frozenset(SINGLES).union(*TRIPLES)
 
+OTHER_TABLES = "`barberpole convert --take` makes a log of another table"
+MANY = 10  # names that a message lists
+
 _UNIT_OF = {stem: unit for stem, _, unit in (name.rpartition("_") for name in KNOWN) if stem}
 
 
@@ -44,6 +47,12 @@ def unknown(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in names if name not in KNOWN)
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names for a message, which a file of another kind may fill with anything."""
+    short = [name if len(name) <= 2 * MANY else f"{name[: 2 * MANY]}..." for name in names[:MANY]]
+    return ", ".join(short) + (f" and {len(names) - MANY} more" if len(names) > MANY else "")
+
+
 def _check_unit(name: str, where: object) -> None:
     lower = name.lower()
     if lower in KNOWN and name != lower:
@@ -69,4 +78,4 @@ def _check_readings(names: set[str], where: object) -> None:
         raise InputError(must(f"column {absent}", "given: SET and RESET come in pairs", "one of the two", where))
     if not has_set and not set(READINGS) <= names:
         wanted = "one with the readings x_lsb, y_lsb, z_lsb, or x_set_lsb.. and x_reset_lsb.."
-        raise InputError(must("the log", wanted, f"columns {', '.join(sorted(names))}", where))
+        raise InputError(must("the log", wanted, f"columns {listed(sorted(names))}; {OTHER_TABLES}", where))

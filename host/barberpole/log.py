@@ -80,7 +80,8 @@ def read_log(path: str | Path) -> Log:
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise InputError(must("the log", f"a file that ends in {', '.join(SUFFIXES)}", repr(path.suffix), path))
+        got = f"{path.suffix!r}; {names_of.OTHER_TABLES}"
+        raise InputError(must("the log", f"a file that ends in {', '.join(SUFFIXES)}", got, path))
     data = read_bytes(path, "the log")
     if not data:
         raise InputError(must("the log", "a file with rows", "an empty file", path))

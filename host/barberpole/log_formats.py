@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
-from barberpole.columns import KNOWN, check_names
+from barberpole.columns import KNOWN, OTHER_TABLES, check_names
 from barberpole.errors import InputError, must
 
 Columns = dict[str, np.ndarray]
@@ -114,7 +114,7 @@ def header_of(data: bytes, where: object) -> list[str]:
     except csv.Error as error:  # a name of more characters than anybody writes
         raise InputError(must("the log's first line", "column names", error, where)) from None
     if len(names) == 1 and any(mark in line for mark in ";\t"):
-        raise InputError(must("the log's columns", "separated by commas", repr(line[:40]), where))
+        raise InputError(must("the log's columns", "separated by commas", f"{line[:40]!r}; {OTHER_TABLES}", where))
     if (marked and len(names) < 2) or all(_number(name) is not None for name in names):
         raise InputError(must("the log's first line", "column names such as x_lsb", repr(line[:40]), where))
     return names
@@ -136,7 +136,8 @@ def _floats(table: pa.Table, notes: list[str], where: object) -> Columns:
         numbers = _numbers(values)
         if numbers is None and name in KNOWN:
             row, cell = _first_text(values)
-            raise InputError(must(f"column {name}", "numbers", f"{cell!r} in row {row + 1}", where))
+            way = f"; {OTHER_TABLES}, times as text too" if name == "t_s" else ""
+            raise InputError(must(f"column {name}", "numbers", f"{cell!r} in row {row + 1}{way}", where))
         if numbers is None:
             notes.append(f"column {name} holds text and was left out")
         else:

@@ -27,6 +27,7 @@ from barberpole.files import read_text, write_atomic
 from barberpole.tables import STRICT, Number, Positive, read_toml, unknown, validate
 
 HASH_DIGITS = 12
+UPWARD = 2  # folders above a model file, within which a plugin's path is written from there
 KEYS = ("effects", "plugins", "sensor", "reference")
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -166,6 +167,11 @@ def _update_list(document: tomlkit.TOMLDocument, key: str, wanted: tuple[str, ..
 
 
 def relative(plugin: str, folder: Path) -> str:
-    path = Path(plugin).resolve()
-    folder = folder.resolve()
-    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()
+    """A plugin's path from the folder of the file that lists it; the whole path where it lies far from there."""
+    path, folder = Path(plugin).resolve(), folder.resolve()
+    if path.is_relative_to(folder):
+        return path.relative_to(folder).as_posix()
+    near = next((up for up in folder.parents[:UPWARD] if path.is_relative_to(up)), None)
+    if near is None or near == Path(near.anchor):
+        return path.as_posix()
+    return "../" * (folder.parents.index(near) + 1) + path.relative_to(near).as_posix()

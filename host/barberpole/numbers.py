@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+LEAST_CHANCE = 1e-300  # where p-values are cut off: smaller ones are lost in a float
+
 
 def plain(value: float | None, digits: int = 4) -> str:
     """Significant figures without an exponent from 0.0001 up to a million: 303200, 0.00123, 1.2e+09."""
@@ -31,6 +33,23 @@ def uncertain(value: float, stderr: float) -> str:
     if digits > 7:
         return f"{value:.6g} ± {stderr:.2g}"
     return f"{value:.{digits}f} ± {stderr:.{digits}f}"
+
+
+def with_error(value: float, stderr: float) -> tuple[str, str]:
+    """The same as two cells of a table, two figures of the error: ("2820", "120"), ("0.00293", "0.00061")."""
+    if not math.isfinite(stderr) or stderr <= 0:
+        return f"{value:.6g}", ""
+    figures = 1 - math.floor(math.log10(stderr))
+    if not -4 <= figures <= 7:
+        digits = figures + math.floor(math.log10(abs(value))) + 1 if value else 1
+        return f"{value:.{max(digits, 1)}g}", f"{stderr:.2g}"
+    after = max(figures, 0)
+    return f"{round(value, figures):.{after}f}", f"{round(stderr, figures):.{after}f}"
+
+
+def chance(p_value: float) -> str:
+    """A p-value; none is told below the least that a diagnosis computes."""
+    return "<1e-300" if p_value <= LEAST_CHANCE else f"{p_value:.1e}"
 
 
 def strict(value: Any) -> Any:

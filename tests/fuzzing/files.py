@@ -32,6 +32,7 @@ FIELD = (
     "fit FILE --method polynomial --json",
     "trajectory pybv11 --shape replay --points 20 --log FILE",
     f"add lag FILE --model {LINEAR}",
+    "convert FILE -o OUT.csv --take t_s=t_s:ms --take x_lsb=z_lsb --take y_lsb=y_lsb --take z_lsb=x_lsb",
 )
 MAGNITUDE = (
     *ANY,

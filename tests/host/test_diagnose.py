@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from barberpole.adding import change
 from barberpole.challenge.record import Recipe, record, rest
+from barberpole.cli import run
 from barberpole.diagnose import Diagnosis, diagnose, diagnose_observations
 from barberpole.diagnose.resting import longest_rest, noise_of
 from barberpole.fit.noise import Noise
@@ -116,6 +117,14 @@ def test_noise_that_turns_from_axis_to_axis_does_not_jump():
     """Stations of a scalar log: the residual is noise of one axis, then of another."""
     recipe = Recipe({}, rows=8000, form="pairs", reference="constant", corner=0.1, seed=8_100_071)
     assert said_of(recipe, with_rest=True).verdict == "adequate"
+
+
+@pytest.mark.parametrize("seed", ["0", "1", "2"])
+def test_the_levels_of_a_converter_are_no_jumps(seed, tmp_path):
+    """Steps of the field, each held: whole counts repeat, and change between two of them by the noise."""
+    log = tmp_path / "linearity.csv"
+    assert run(["simulate", "hmc5983", "--program", "linearity", "--seed", seed, "-o", str(log)]) == 0
+    assert diagnose(read_log(log), model_of(BASE)).verdict == "adequate"
 
 
 def test_a_suspect_that_leaves_jumps_is_no_cause():

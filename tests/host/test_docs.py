@@ -2,7 +2,8 @@
 
 A page's commands are its indented lines that begin with `barberpole`; they run in order in a folder of their own. What
 follows `#` may say "exit 1". A command that stays until Ctrl-C runs beside the others; its first line is the port that
-stands where the page says /dev/ttyACM0.
+stands where the page says /dev/ttyACM0. A Python block is what the page's new effect becomes; lines with semicolons are
+a table, odd.csv; a line of plugins goes into the model file.
 """
 
 import contextlib
@@ -25,14 +26,22 @@ GENERATED = ("boards.md", "limits.md", "reproduction.md", "physics.md")
 PAGES = [REPOSITORY / "README.md", *sorted(page for page in DOCS.glob("*.md") if page.name not in GENERATED)]
 STAYS = ("twin", "workbench")
 PORT = "/dev/ttyACM0"
-QUOTES = ("missing-effect.md",)  # pages whose other indented lines are what the commands print
+QUOTES = ("missing-effect.md", "your-own-effect.md")  # pages whose other indented lines are what the commands print
+TABLE = "odd.csv"
 PATIENCE_S = 60.0
 
 
 def indented(page: Path) -> Iterator[str]:
-    """Lines of the page's indented blocks."""
+    """Lines of the page's indented blocks, and its Python blocks whole."""
+    code: list[str] | None = None
     for line in page.read_text().splitlines():
-        if line.startswith("    ") and not line.lstrip().startswith(("-", "*")):
+        if line.startswith("```"):
+            if code:
+                yield "\n".join(code)
+            code = [] if line == "```python" else None
+        elif code is not None:
+            code.append(line)
+        elif line.startswith("    ") and not line.lstrip().startswith(("-", "*")):
             yield line.strip()
 
 
@@ -57,6 +66,18 @@ class Shell:
         said = self.capsys.readouterr()
         assert code == expected, f"{line}\n{said.err}"
         self.printed += said.out
+
+    def told(self, line: str) -> None:
+        """What a reader does who is no command."""
+        if line.startswith("plugins ="):
+            model = Path("own", "model.toml")
+            model.write_text(model.read_text() + line + "\n")
+        elif line.startswith("def "):
+            (plugin,) = Path().glob("*.py")
+            plugin.write_text(plugin.read_text().partition("def params")[0] + line + "\n")
+        elif ";" in line and not line.startswith("#"):
+            with Path(TABLE).open("a") as table:
+                table.write(line + "\n")
 
     def start(self, words: list[str]) -> None:
         quiet = ["--no-browser"] if words[0] == "workbench" else []
@@ -95,12 +116,11 @@ def test_a_page_does_what_it_says(page, shell, tmp_path):
     for line in indented(page):
         if line.startswith("barberpole "):
             shell(line)
-        elif line.startswith("plugins ="):
-            model = tmp_path / "own" / "model.toml"
-            model.write_text(model.read_text() + line + "\n")
+        else:
+            shell.told(line)
     if page.name in QUOTES:
         printed = " ".join(shell.printed.split())
-        quoted = [line for line in indented(page) if not line.startswith("barberpole ")]
+        quoted = [line for line in indented(page) if not line.startswith(("barberpole ", "plugins =", "def "))]
         assert quoted
         assert [line for line in quoted if " ".join(line.split()) not in printed] == []
 

@@ -17,7 +17,7 @@ from barberpole import cli
 from barberpole.errors import InputError
 from barberpole.fit.fit import fit_log
 from barberpole.fleet import pool
-from barberpole.fleet.identity import identity
+from barberpole.fleet.identity import identity, in_folders
 from barberpole.fleet.journal import beside, rows_of
 from barberpole.fleet.run import CHUNK, logs, run
 from barberpole.fleet.settings import settings_of
@@ -201,6 +201,28 @@ def test_names_say_board_lot_and_date():
     assert identity(Path("a/b12.csv"), {"uid": "3A00", "lot": "L9"}).board == "3A00"
     found = identity(Path("x/L4-0007-2026-05-01.csv"), {}, r"(?P<lot>L\d+)-(?P<board>\d+)-(?P<date>[\d-]+)")
     assert vars(found) == {"board": "0007", "lot": "L4", "date": "2026-05-01"}
+
+
+def test_a_log_named_by_its_date_or_like_all_others_is_of_its_folders_board():
+    """b1/log.csv and b2/log.csv are two boards, not one that changed."""
+    assert vars(identity(Path("/lot3/b12/20260501.csv"), {})) == {"board": "b12", "lot": "lot3", "date": "2026-05-01"}
+    assert in_folders(["lot3/b1/log.csv", "lot3/b1/turned.csv"]) is None
+    assert in_folders(["b1/log.csv"]) is None
+    pattern = in_folders(["/lot3/b1/log.csv", "/lot3/b2/log.csv"])
+    assert vars(identity(Path("/lot3/b2/log.csv"), {}, pattern)) == {"board": "b2", "lot": "lot3", "date": None}
+
+
+def test_boards_in_folders_are_boards(folder, tmp_path, capsys):
+    for name in ("b1", "b2"):
+        (tmp_path / "lot" / name).mkdir(parents=True)
+        log = next(iter(sorted(folder.glob("board*.parquet"))))
+        (tmp_path / "lot" / name / "log.parquet").write_bytes(log.read_bytes())
+    output = tmp_path / "fleet.parquet"
+    assert cli.run(["fleet", str(tmp_path / "lot"), "-o", str(output), "--processes", "1"]) == 0
+    said = capsys.readouterr()
+    assert "each board is named after its folder" in said.err
+    assert f"barberpole fleet report {output} -o {tmp_path / 'fleet.html'}" in said.out
+    assert [row["lot"] for row in read_fleet(output).rows] == ["lot", "lot"]
 
 
 @pytest.mark.parametrize("words", [["fleet"], ["fleet", "fit"], ["fleet", "--do", "fit"]])

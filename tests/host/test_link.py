@@ -8,11 +8,17 @@ import tty
 from pathlib import Path
 
 import pytest
+from barberpole.challenge.record import Recipe
+from barberpole.challenge.record import record as record_truth
+from barberpole.cli import run
+from barberpole.commands import board
 from barberpole.errors import InputError, PortError
 from barberpole.link import record as recording
 from barberpole.link.deploy import pull
 from barberpole.link.record import record
+from barberpole.log import Log, read_log, write_log
 from barberpole.records import ROWS, decode, encode
+from fuzzing.one import HEADER, header_text, records
 
 
 @pytest.fixture
@@ -131,3 +137,28 @@ def test_a_pull_that_fails_on_the_way_leaves_the_last_one(cable, tmp_path, monke
         pull(cable[1], target)
     assert target.read_bytes() == b"whole"
     assert names(tmp_path) == ["run.bpr"]
+
+
+def test_records_become_a_table_where_one_is_asked_for(tmp_path, monkeypatch, capsys):
+    """No raw records under the name of a table."""
+    write_log(Log(record_truth(Recipe({}, rows=40, form="demodulated", seed=1)), tmp_path, ""), tmp_path / "turned.csv")
+    said, asked = records(tmp_path)(header_text(HEADER)), []
+
+    def recorded(port, target, *_):
+        asked.append(target)
+        target.write_bytes(said)
+        return 5
+
+    monkeypatch.setattr(board, "record_board", recorded)
+    for name in ("log.csv", "log.parquet", "log.bpr"):
+        assert run(["record", "--port", "P", "-o", str(tmp_path / name)]) == 0
+    assert set(asked) == {tmp_path / "log.bpr"}
+    assert read_log(tmp_path / "log.csv").n == read_log(tmp_path / "log.bpr").n > 0
+    for command, name in (("record", "log.txt"), ("pull", "run.csv")):
+        assert run([command, "--port", "P", "-o", str(tmp_path / name)]) == 2
+        assert "must be a file that ends in .bpr" in capsys.readouterr().err
+
+
+def test_a_port_that_is_not_there_is_told_with_what_helps(capsys):
+    assert run(["record", "--port", "/dev/nothing", "-o", "a.bpr"]) == 2
+    assert "`barberpole doctor` lists boards, `barberpole twin` emulates one" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from barberpole.commands.console import AS_JSON, OUT, print_json, table
+from barberpole.commands.console import AS_JSON, OUT, print_json, say, table
 from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut
 
 app = typer.Typer(no_args_is_help=True, help="Several sensors on one board: calibrated in one run; their gradient.")
@@ -131,7 +131,7 @@ def simulate_logs(
     if as_json:
         print_json({"output": str(output), "hidden_gain": {name: d.tolist() for name, d in drift.items()}})
     else:
-        OUT.print(f"turned.csv, run.csv, later.csv and seen.csv written to {output}")
+        say(f"turned.csv, run.csv, later.csv and seen.csv written to {output}")
 
 
 def build_array(name: str, calibration: Path | None, output: Path, say: Callable[[str], None] | None) -> dict:
@@ -169,4 +169,4 @@ def _show(found, output: Path, as_json: bool) -> None:
         left = "" if s["left_ut"] is None else f"{1000 * s['left_ut']:.1f}"
         shown.add_row(name, *(f"{1e6 * (g - 1):+.0f}" for g in s["gain"]), left)
     OUT.print(shown)
-    OUT.print(f"calibration written to {output}")
+    say(f"calibration written to {output}")

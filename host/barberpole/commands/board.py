@@ -9,14 +9,17 @@ from barberpole.arrays.names import is_array
 from barberpole.calibration import read_calibration
 from barberpole.commands import array as arrays
 from barberpole.commands import imcs
-from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress, table
+from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress, say, table
 from barberpole.driver_board import is_driver
+from barberpole.errors import InputError, must
 from barberpole.link.deploy import Flashed
 from barberpole.link.deploy import flash as flash_board
 from barberpole.link.deploy import pull as pull_run
 from barberpole.link.record import record as record_board
 from barberpole.link.record import soft_reset
+from barberpole.log import read_log, write_log
 
+RECORDS, TABLES = ".bpr", (".csv", ".parquet")
 WAYS = {
     "mpy": ".mpy files, of the file system",
     "romfs": "ROMFS image, of the partition",
@@ -42,11 +45,11 @@ def build(
     """Write the flash-resident modules, .mpy files, manifest, ROMFS image and budget."""
     if is_driver(board):
         made = imcs.build_driver(board, replay, output, None if as_json else _dim)
-        print_json(made) if as_json else OUT.print(f"trajectory {made['trajectory']} in {output}")
+        print_json(made) if as_json else say(f"trajectory {made['trajectory']} in {output}")
         return
     if is_array(board):
         made = arrays.build_array(board, calibration, output, None if as_json else _dim)
-        print_json(made) if as_json else OUT.print(f"calibration {made['calibration']} in {output}")
+        print_json(made) if as_json else say(f"calibration {made['calibration']} in {output}")
         return
     from barberpole_codegen.build import build as build_board
 
@@ -64,7 +67,7 @@ def build(
 
 
 def _dim(text: str) -> None:
-    OUT.print(text, style="dim")
+    say(text, "dim")
 
 
 def _budget_table(budget: dict):
@@ -101,10 +104,11 @@ def flash(
         print_json(_flashed(done))
     elif done.passed:
         notes(tuple(f"{path} is not used: the build is found before it" for path in done.strays.idle))
-        OUT.print(f"{port} runs calibration {done.calibration} (build {done.build}, {done.way})")
+        runs = f"calibration {done.calibration} (build {done.build}, {done.way})"
+        say(f"{port} runs {runs if done.calibration else f'build {done.build} ({done.way})'}")  # a coil driver has none
     else:
         for reason in done.reasons:
-            OUT.print(f"not flashed: {reason}")
+            say(f"not flashed: {reason}")
     if not done.passed:
         raise typer.Exit(1)
 
@@ -118,19 +122,32 @@ def _flashed(done: Flashed) -> dict:
 
 def record(
     port: PortOption,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Board records (.bpr).")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Board records (.bpr); .csv or .parquet: a table beside them.")
+    ],
     rows: Annotated[int | None, typer.Option(min=1, help="Stop after so many records.")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so many seconds.")] = None,
     restart: Annotated[bool, typer.Option(help="Begin with a soft reset, so that the power-up is in the log.")] = True,
     as_json: bool = AS_JSON,
 ) -> None:
     """Record what a board streams, until --rows, --seconds or Ctrl-C."""
+    raw = _raw(output, *TABLES)
     with progress("recording", rows) as tick:
-        kept = record_board(port, output, rows, seconds, soft_reset if restart else lambda _: None, tick, True)
+        kept = record_board(port, raw, rows, seconds, soft_reset if restart else lambda _: None, tick, True)
+    if raw != output:
+        write_log(read_log(raw), output)
     if as_json:
         print_json({"output": str(output), "records": kept})
     else:
-        OUT.print(f"{kept} records written to {output}")
+        say(f"{kept} records written to {raw}" + (f", as a table to {output}" if raw != output else ""))
+
+
+def _raw(output: Path, *tables: str) -> Path:
+    """Where the board's records go: beside a table that is made of them."""
+    if output.suffix not in (RECORDS, *tables):
+        wanted = f"a file that ends in {', '.join((RECORDS, *tables))}"
+        raise InputError(must("what the board's records are written to", wanted, output))
+    return output.with_suffix(RECORDS)
 
 
 def pull(
@@ -139,11 +156,11 @@ def pull(
     as_json: bool = AS_JSON,
 ) -> None:
     """Fetch the coil run and the verdict of the last power-up from the board's flash; the board stops streaming."""
-    pull_run(port, output)
+    pull_run(port, _raw(output))
     if as_json:
         print_json({"output": str(output)})
     else:
-        OUT.print(f"written to {output}")
+        say(f"written to {output}")
 
 
 def twin(

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from barberpole.commands.console import AS_JSON, OUT, print_json, table
+from barberpole.commands.console import AS_JSON, OUT, print_json, say, table
 
 app = typer.Typer(help="What a board file asks of its parts.", no_args_is_help=True)
 
@@ -54,6 +54,6 @@ def _print(name: str, found: list[str], wired: list) -> None:
         shown.add_row(use.key, use.name, use.port, use.function)
     OUT.print(shown)
     for conflict in found:
-        OUT.print(f"conflict: {conflict}", style="red", highlight=False, soft_wrap=True)
+        say(f"conflict: {conflict}", "red")
     if not found:
         OUT.print("no conflict")

@@ -13,7 +13,7 @@ from barberpole.calibration import Calibration, read_calibration, write_calibrat
 from barberpole.calibration_tables import PriorTable, Step
 from barberpole.commands import big, show
 from barberpole.commands import methods as published
-from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, progress
+from barberpole.commands.console import AS_JSON, ERR, notes, print_json, progress, say
 from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut, with_magnitude
 from barberpole.diagnose import compare as compare_fit
 from barberpole.diagnose import diagnose as diagnose_log
@@ -186,7 +186,7 @@ def diagnose(
             print_json(({"log": str(path)} if len(logs) > 1 else {}) | found.to_json())
         else:
             notes(data.notes)
-            show.diagnosis(path, found)
+            show.diagnosis(path, found, model)
     notes(() if bad else alias_notes(file.effects))
     return bad
 
@@ -262,13 +262,19 @@ def verify(
 def convert(
     log: LogPath,
     output: Annotated[Path, typer.Option("-o", "--output", help=".csv or .parquet")],
+    take: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=COLUMN[:UNIT], once for each column of another program's table: bx_ut=Bx:gauss."),
+    ] = None,
     as_json: bool = AS_JSON,
 ) -> None:
-    """Write a log in another format."""
-    data = read_log(log)
+    """Write a log in another format; with --take, make one of a table that another program wrote."""
+    from barberpole.foreign import read_foreign
+
+    data = read_foreign(log, take) if take else read_log(log)
     write_log(data, output)
     notes(data.notes)
     if as_json:
         print_json({"output": str(output), "rows": data.n, "skipped": data.skipped})
     else:
-        OUT.print(f"{data.n} rows written to {output}")
+        say(f"{data.n} rows written to {output}")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from barberpole.commands import show
-from barberpole.commands.console import AS_JSON, OUT, print_json
+from barberpole.commands.console import AS_JSON, print_json, say
 from barberpole.effects import ALIASES, STACK, alias_notes
 from barberpole.plugins import new_plugin
 
@@ -28,7 +28,7 @@ def effects(as_json: bool = AS_JSON) -> None:
     else:
         show.catalogue(STACK)
         for sentence in alias_notes(tuple(ALIASES)):
-            OUT.print(sentence)
+            say(sentence)
 
 
 def new(
@@ -41,4 +41,4 @@ def new(
     if as_json:
         print_json({"path": str(path)})
         return
-    OUT.print(f'{path} written; fill in forward, then list it in the model file: plugins = ["{path.name}"]')
+    say(f'{path} written; fill in forward, then list it in the model file: plugins = ["{path.name}"]')

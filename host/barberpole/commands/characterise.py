@@ -11,7 +11,7 @@ from barberpole.board import load_sensor
 from barberpole.challenge.motion import smooth
 from barberpole.characterise.simulate import readings
 from barberpole.columns import FIELD, READINGS
-from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
+from barberpole.commands.console import AS_JSON, OUT, notes, print_json, say, table
 from barberpole.errors import InputError, must
 from barberpole.log import Log, read_log, write_log
 from barberpole.numbers import uncertain
@@ -58,7 +58,7 @@ def characterise(
         shown.add_row(f.quantity, f.case, uncertain(f.value, f.stderr), f.unit)
     OUT.print(shown)
     if output:
-        OUT.print(f"page written to {output}")
+        say(f"page written to {output}")
 
 
 def _json(sheet: "Sheet") -> dict:
@@ -91,7 +91,7 @@ def simulate(
     if as_json:
         print_json({"sensor": kind.name, "program": program, "n": log.n, "log": str(output)})
     else:
-        OUT.print(f"{log.n} readings of a {kind.name} ({program}) written to {output}")
+        say(f"{log.n} readings of a {kind.name} ({program}) written to {output}")
 
 
 def _simulated(kind: Sensor, program: str, temp_c: float, seed: int, path: Path) -> Log:

@@ -1,6 +1,7 @@
 """What the commands share: JSON on stdout, tables for people, progress on stderr."""
 
 import json
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -22,7 +23,7 @@ from rich.text import Text
 
 from barberpole.numbers import strict
 
-# No markup: a path or a column's name may hold brackets. Sentences are not wrapped: a line is a line in a pipe too.
+# No markup: a path or a column's name may hold brackets. Rich wraps no sentence, `say` does: a line is one in a pipe.
 OUT = Console(highlight=False, markup=False, soft_wrap=True)
 ERR = Console(stderr=True, highlight=False, markup=False)
 
@@ -32,6 +33,21 @@ AS_JSON = typer.Option(False, "--json", help="Print one JSON object and nothing 
 def print_json(answer: dict[str, Any]) -> None:
     """One line of strict JSON: what is not a finite number becomes null."""
     print(json.dumps(strict(answer)), flush=True)
+
+
+def folded(sentence: str, console: Console, hang: int = 2) -> str:
+    """Broken at words, with `hang` blanks before what follows, where a terminal is too narrow; whole in a pipe."""
+    if not console.is_terminal or len(sentence) <= console.width:
+        return sentence
+    blanks = " " * hang
+    return textwrap.fill(
+        sentence, console.width, subsequent_indent=blanks, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def say(sentence: str, style: str = "", hang: int = 2, console: Console = OUT) -> None:
+    """A sentence for people."""
+    console.print(folded(sentence, console, hang), style=style or None, soft_wrap=True)
 
 
 def table(title: str, *heads: str) -> Table:
@@ -45,7 +61,7 @@ def table(title: str, *heads: str) -> Table:
 def notes(sentences: tuple[str, ...]) -> None:
     """Remarks about the input, on stderr."""
     for sentence in sentences:
-        ERR.print(f"note: {sentence}", style="dim", soft_wrap=True)
+        say(f"note: {sentence}", "dim", console=ERR)
 
 
 class _Rate(ProgressColumn):

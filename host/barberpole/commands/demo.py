@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from barberpole.commands.console import AS_JSON, ERR, OUT, print_json, table
+from barberpole.commands.console import AS_JSON, ERR, OUT, print_json, say, table
 from barberpole.errors import InputError, must
 from barberpole.files import cannot_write
 
@@ -42,10 +42,10 @@ def demo(
             bar.console.print(title, style="bold")
             bar.update(task, description=title[:48])
 
-        def say(text: str) -> None:
-            bar.console.print(f"        {text}", style="dim", soft_wrap=True)
+        def detail(text: str) -> None:
+            say(f"        {text}", "dim", hang=8, console=bar.console)
 
-        outcome = Story(board, hidden, folder, seed, chapter, say, lambda n: bar.advance(task, n)).run()
+        outcome = Story(board, hidden, folder, seed, chapter, detail, lambda n: bar.advance(task, n)).run()
     page = folder / "demo.html"
     write_demo_page(outcome, page)
     if as_json:
@@ -71,7 +71,7 @@ def _show(outcome, page: Path, seconds: float) -> None:
     answer = outcome.to_json()
     missing = f"{outcome.named} is missing" if outcome.named else "nothing is missing"
     verdict = f"\nHidden from the model: {outcome.hidden}. Verdict: {answer['verdict']}; {missing}."
-    OUT.print(verdict, style="bold")
+    say(verdict, "bold")
     shown = table("", "error, rms", "before", "after", "noise")
     lsb_per_ut = float(sum(outcome.before.session.truth["scale_lsb_per_ut"]) / 3)
     for name, key in (("on the log", "rms"), ("held out", "heldout")):
@@ -82,5 +82,5 @@ def _show(outcome, page: Path, seconds: float) -> None:
     old_gain, new_gain = (", ".join(f"{ppm:+.0f}" for ppm in b.gain_error_ppm) for b in (outcome.before, outcome.after))
     shown.add_row("gains x, y, z against the truth, ppm", old_gain, new_gain, "")
     OUT.print(shown)
-    OUT.print(f"self-calibration at power-up: {answer['selfcal_s']:.2f} s of board time; demo: {seconds:.0f} s")
-    OUT.print(f"open {page}")
+    say(f"self-calibration at power-up: {answer['selfcal_s']:.2f} s of board time; demo: {seconds:.0f} s")
+    say(f"open {page}")

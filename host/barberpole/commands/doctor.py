@@ -20,6 +20,8 @@ def doctor(as_json: bool = AS_JSON) -> int:
         print_json({"ok": not lacking, "findings": [finding.to_json() for finding in findings]})
         return 1 if lacking else 0
     shown = table("", "what", "state", "found", "for")
+    for column in shown.columns:
+        column.justify = "left"
     for finding in by_extra(findings):
         state = "ok" if finding.ok else "MISSING" if finding.needed else "not here"
         shown.add_row(finding.what, state, finding.found, finding.serves)

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, table
+from barberpole.commands.console import AS_JSON, ERR, OUT, notes, print_json, say, table
 from barberpole.errors import InputError, must
+from barberpole.numbers import plain
 
 FIRST = "fit"  # what `barberpole fleet 'logs/*.parquet' -o fleet.parquet` does
 BAD_INPUT = 2
@@ -130,15 +131,15 @@ def report(
     if as_json:
         print_json(found.to_json())
         return
-    OUT.print(verdict(found), style="bold")
+    say(verdict(found), "bold")
     for one in found.outliers[:LISTED]:
-        OUT.print(f"{one.board}: {one.why}")
+        say(f"{one.board}: {one.why}")
     for one in found.changes[:LISTED]:
-        OUT.print(f"{one.board}: {one.why}")
+        say(f"{one.board}: {one.why}")
     for where, effects in found.lots.items():
         for one in effects:
             rivals = f"; cannot be told from {', '.join(one.rivals)}" if one.rivals else ""
-            OUT.print(f"lot {where}: {one.effect} {one.kind}, {one.size:.2g} of the noise{rivals}")
+            say(f"lot {where}: {one.effect} {one.kind}, {one.size:.2g} of the noise{rivals}")
     notes(found.notes)
 
 
@@ -156,7 +157,7 @@ def common(fleet: Table, lot: Lot = None, as_json: bool = AS_JSON) -> None:
     heads = ("parameter", "mean", "between", "own error", "unit", "off, LSB", "it is")
     shown = table(f"{max(one.boards for one in found)} boards, noise {found[0].noise_lsb:.3g} LSB", *heads)
     for one in found:
-        figures = (f"{one.mean:.4g}", f"{one.tau:.3g}", f"{one.stderr:.2g}", one.unit, f"{one.error_lsb:.3g}")
+        figures = (f"{one.mean:.4g}", f"{one.tau:.3g}", plain(one.stderr, 2), one.unit, f"{one.error_lsb:.3g}")
         shown.add_row(one.name, *figures, one.kind)
     OUT.print(shown)
 
@@ -176,7 +177,7 @@ def extract(
     if as_json:
         print_json({"output": str(output), "calibration": found.hash, "log": found.log_name})
     else:
-        OUT.print(f"calibration {found.hash} of {board} written to {output}")
+        say(f"calibration {found.hash} of {board} written to {output}")
 
 
 def _any(rows: list[dict]) -> int:
@@ -186,14 +187,17 @@ def _any(rows: list[dict]) -> int:
 
 def _run(do, patterns, output, model, calibration, sensor, name, processes, dask, as_json) -> list[dict]:
     from barberpole.fleet import pool
-    from barberpole.fleet.identity import check_pattern
+    from barberpole.fleet.identity import check_pattern, in_folders
     from barberpole.fleet.run import logs, run
     from barberpole.fleet.settings import settings_of
     from barberpole.modelfile import read_model
 
     paths = logs(patterns)
     file = read_model(model) if model else None
-    settings = settings_of(do, file, calibration, sensor, check_pattern(name) if name else None)
+    pattern = check_pattern(name) if name else in_folders(paths)
+    if pattern and not name and not as_json:
+        notes((f"all logs are named {Path(paths[0]).name}, so each board is named after its folder (or by --name)",))
+    settings = settings_of(do, file, calibration, sensor, pattern)
     where = pool.dask(dask) if dask else nullcontext(pool.processes(processes))
     try:
         with where as chosen, _boards(f"fleet {do}", len(paths)) as tick:
@@ -239,13 +243,15 @@ def _show(do: str, found, output: Path, as_json: bool) -> None:
     if as_json:
         print_json({"do": do, "output": str(output), **counts, "failures": failed})
         return
-    OUT.print(
-        f"{counts['ok']} of {rows} logs done ({found.known} of them before), {found.rate:.0f} a second; "
+    say(
+        f"{counts['ok']} of {rows} logs done ({found.known} of them before), {plain(found.rate, 2)} a second; "
         f"written to {output}"
     )
+    if counts["ok"]:
+        OUT.print(f"all of them together: barberpole fleet report {output} -o {output.with_suffix('.html')}")
     if do == "verify":
-        OUT.print(f"{counts['not_passed']} are not what their calibration says")
+        say(f"{counts['not_passed']} are not what their calibration says")
     for one in failed[:LISTED]:
-        ERR.print(f"failed: {one['log']}: {one['reason']}", soft_wrap=True)
+        say(f"failed: {one['log']}: {one['reason']}", console=ERR)
     if len(failed) > LISTED:
         ERR.print(f"and {len(failed) - LISTED} more; column `reason` of {output} has them all")

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from barberpole.commands.console import AS_JSON, OUT, notes, print_json
+from barberpole.commands.console import AS_JSON, notes, print_json, say
 from barberpole.driver_board import Driver
 from barberpole.errors import InputError, must
 from barberpole.imcs import join, read_driven
@@ -35,7 +35,7 @@ def imcs(
         print_json({"output": str(output), "rows": found.log.n, "dropped": found.dropped, **clocks})
     else:
         notes(found.log.notes)
-        OUT.print(f"{found.log.n} rows with their field written to {output}; {found.dropped} beside steps left out")
+        say(f"{found.log.n} rows with their field written to {output}; {found.dropped} beside steps left out")
 
 
 def _constants(text: str | None) -> np.ndarray | None:

@@ -11,7 +11,7 @@ from tomlkit.items import InlineTable
 from barberpole.board import load_sensor
 from barberpole.calibration import read_calibration
 from barberpole.calibration_tables import Value
-from barberpole.commands.console import AS_JSON, OUT, notes, print_json, table
+from barberpole.commands.console import AS_JSON, OUT, notes, print_json, say, table
 from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut
 from barberpole.files import write_atomic
 from barberpole.log import Log, read_log
@@ -20,6 +20,7 @@ from barberpole.methods.over_temperature import values_of
 from barberpole.methods.over_temperature_log import from_logs
 from barberpole.methods.registry import ELSEWHERE, METHODS, find_method
 from barberpole.modelfile import read_model
+from barberpole.numbers import with_error
 
 FORMAT = 1
 
@@ -94,7 +95,7 @@ def write_and_show(answer: Answer, data: Log, method: str, output: Path | None, 
         notes(data.notes)
         show_values(answer)
         if output:
-            OUT.print(f"figures written to {output}")
+            say(f"figures written to {output}")
 
 
 def to_json(answer: Answer | None, method: str | None) -> dict:
@@ -111,10 +112,10 @@ def show_values(answer: Answer | None) -> None:
         return
     shown = table("in the method's own terms", "figure", "value", "± 1 σ", "unit")
     for name, v in answer.values.items():
-        shown.add_row(name, f"{v.value:.6g}", "" if np.isnan(v.stderr) else f"{v.stderr:.2g}", v.unit)
+        shown.add_row(name, *with_error(v.value, v.stderr), v.unit)
     OUT.print(shown)
     for note in answer.notes:
-        OUT.print(note)
+        say(note)
 
 
 def values_text(values: Values, data: Log, method: str) -> str:

@@ -9,7 +9,7 @@ import typer
 from barberpole.board import load_sensor
 from barberpole.calibration import Calibration, read_calibration
 from barberpole.commands import show
-from barberpole.commands.console import AS_JSON, OUT, notes, print_json, progress
+from barberpole.commands.console import AS_JSON, notes, print_json, progress, say
 from barberpole.errors import InputError, must
 from barberpole.log import Log, read_log
 from barberpole.modelfile import ModelFile, read_model
@@ -61,8 +61,8 @@ def report(
     for one in studies:
         notes(one.log.notes)
         named = ", ".join(s.effect for s in one.diagnosis.suspects) if one.diagnosis else ""
-        OUT.print(f"{one.log.path.name}: {one.verdict}{': ' + named if named else ''}", style="bold")
-    OUT.print(f"page written to {output}")
+        say(f"{one.log.path.name}: {one.verdict}{': ' + named if named else ''}", style="bold")
+    say(f"page written to {output}")
 
 
 def _model(model: str, known: Calibration | None) -> ModelFile:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from barberpole.adding import Change
-from barberpole.commands.console import OUT, table
+from barberpole.commands.console import OUT, say, table
 from barberpole.diagnose import Comparison, Diagnosis, Pattern
 from barberpole.effects import Effect
 from barberpole.fit.fit import Fit
-from barberpole.numbers import plain
+from barberpole.numbers import chance, plain, with_error
 from barberpole.summary import Summary
 from barberpole.verify import Verification
 
@@ -22,61 +22,64 @@ def fit_tables(fit: Fit, output: Path | None) -> None:
     for name, param, value, error, free in zip(
         fit.model.names, fit.model.params, fit.p, fit.stderr, fit.free, strict=True
     ):
-        shown.add_row(name, f"{value:.6g}" if free else "not determined", f"{error:.2g}" if free else "", param.unit)
+        shown.add_row(name, *(with_error(value, error) if free else ("not determined", "")), param.unit)
     OUT.print(shown)
     norm = fit.rms_norm_percent()
     in_field = f"{norm:.3g} % of the field" if norm is not None else f"{1000 * fit.rms_ut():.4g} nT"
-    OUT.print(f"residual {fit.rms_lsb:.5g} LSB rms ({in_field}), held out {fit.heldout_rms_lsb:.5g} LSB")
+    say(f"residual {fit.rms_lsb:.5g} LSB rms ({in_field}), held out {fit.heldout_rms_lsb:.5g} LSB")
     if output:
-        OUT.print(f"calibration written to {output}")
+        say(f"calibration written to {output}")
 
 
 def comparison(found: Comparison) -> None:
     """Residual by axis and the patterns in it."""
     axes = ", ".join(f"{axis} {plain(rms)}" for axis, rms in found.rms_by_axis_lsb.items())
-    OUT.print(f"residual {plain(found.rms_lsb)} LSB rms ({axes}); noise {plain(found.noise_lsb)} LSB", style="bold")
+    say(f"residual {plain(found.rms_lsb)} LSB rms ({axes}); noise {plain(found.noise_lsb)} LSB", style="bold")
     patterns(found.patterns)
 
 
 def patterns(found: Sequence[Pattern]) -> None:
     """What the residual follows."""
     if not found:
-        OUT.print("the residual follows nothing that was logged")
+        say("the residual follows nothing that was logged")
         return
     shown = table("the residual follows", "axis", "against", "shape", "rms LSB", "p")
     for column in shown.columns[1:3]:
         column.justify = "left"
     for p in found[:MANY]:
-        shown.add_row(p.axis, p.against, p.shape, plain(p.rms_lsb, 3), f"{p.p_value:.1e}")
+        shown.add_row(p.axis, p.against, p.shape, plain(p.rms_lsb, 3), chance(p.p_value))
     OUT.print(shown)
 
 
-def diagnosis(path: Path, found: Diagnosis) -> None:
-    """Verdict first, then what it rests on."""
-    OUT.print(
+def diagnosis(path: Path, found: Diagnosis, model: str) -> None:
+    """Verdict first, then what it rests on and what to do next; `model` as it was given."""
+    say(
         f"{path.name}: {found.verdict}  ({found.n} readings, residual {plain(found.rms_lsb)} LSB, "
         f"noise {plain(found.noise_lsb)} LSB)",
         style=COLOUR.get(found.verdict, "bold"),
     )
     if found.suspects:
-        shown = table("suspects", "effect", "held-out fall", "rms after LSB", "p", "cannot be told from")
+        each = ", each beside those above it" if len(found.suspects) > 1 else ""
+        shown = table(f"suspects{each}", "effect", "held-out fall", "rms after LSB", "p", "cannot be told from")
         shown.columns[-1].justify = "left"
         for s in found.suspects:
             shown.add_row(
                 s.effect,
                 f"{100 * s.heldout_drop:.1f} %",
                 plain(s.rms_after_lsb),
-                f"{s.p_value:.1e}",
+                chance(s.p_value),
                 ", ".join(s.confounded_with),
             )
         OUT.print(shown)
     patterns(found.patterns)
     if found.cannot_be_seen:
-        OUT.print(f"this log cannot see: {', '.join(found.cannot_be_seen)}")
+        say(f"this log cannot see: {', '.join(found.cannot_be_seen)}")
     for effect, why in found.cannot_be_judged.items():
-        OUT.print(f"cannot be judged: {effect}: {why}")
+        say(f"cannot be judged: {effect}: {why}")
     if found.next_experiment:
-        OUT.print(f"next: {found.next_experiment}")
+        say(f"next: {found.next_experiment}")
+    for first in found.suspects[: found.verdict == "missing"]:
+        OUT.print(f"put it in: barberpole add {first.effect} --model {model} {path}")
 
 
 def change(found: Change, model: Path | None) -> None:
@@ -86,15 +89,18 @@ def change(found: Change, model: Path | None) -> None:
     shown.add_row("held out", f"{found.before.heldout_rms_lsb:.5g}", f"{found.after.heldout_rms_lsb:.5g}")
     shown.add_row("noise", "", f"{found.noise_lsb:.5g}")
     OUT.print(shown)
+    effects = found.after.model.effects
     if model:
-        OUT.print(f"{model} now has {', '.join(found.after.model.effects)}")
+        say(f"{model} now has {', '.join(effects)}")
+    else:
+        OUT.print(f"go on with --model {','.join(effects)}")
 
 
 def verification(found: Verification) -> None:
     """Pass or fail, and each check in a sentence."""
-    OUT.print("pass" if found.passed else "FAIL", style="bold green" if found.passed else "bold red")
+    say("pass" if found.passed else "FAIL", style="bold green" if found.passed else "bold red")
     for check in found.checks:
-        OUT.print(f"{'ok  ' if check.ok else 'FAIL'}  {check.sentence}")
+        say(f"{'ok  ' if check.ok else 'FAIL'}  {check.sentence}")
 
 
 def catalogue(effects: Sequence[Effect]) -> None:
@@ -109,22 +115,22 @@ def catalogue(effects: Sequence[Effect]) -> None:
 
 def summary(found: Summary) -> None:
     """A log in one screen."""
-    OUT.print(f"{found.log}: {found.rows} rows{_skipped(found)}", style="bold")
+    say(f"{found.log}: {found.rows} rows{_skipped(found)}", style="bold")
     for line in _facts(found):
-        OUT.print(line)
+        say(line)
     shown = table("", "column", "least", "mean", "greatest", "unit")
     shown.columns[-1].justify = "left"
     for c in found.columns:
         shown.add_row(c.name, plain(c.low), plain(c.mean), plain(c.high), c.unit)
     OUT.print(shown)
-    OUT.print(f"can show: {', '.join(found.shows) or 'no effect'}")
+    say(f"can show: {', '.join(found.shows) or 'no effect'}")
     reasons: dict[str, list[str]] = {}
     for effect, why in found.cannot_show.items():
         reasons.setdefault(why, []).append(effect)
     for why, effects in reasons.items():
-        OUT.print(f"cannot show: {', '.join(effects)} ({why})")
+        say(f"cannot show: {', '.join(effects)} ({why})")
     for note in found.notes:
-        OUT.print(f"note: {note}", style="dim")
+        say(f"note: {note}", style="dim")
 
 
 def _skipped(found: Summary) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from barberpole.board import load_board
-from barberpole.commands.console import AS_JSON, OUT, print_json
+from barberpole.commands.console import AS_JSON, print_json, say
 from barberpole.errors import InputError, must
 from barberpole.files import write_atomic
 from barberpole.log import read_log
@@ -42,10 +42,10 @@ def trajectory(
         print_json(_summary(table))
     else:
         largest = ", ".join(f"{ma:.3g}" for ma in table.unit_ma)
-        OUT.print(f"{table.name}: {table.points} points in {len(table.bytes)} bytes, id {table.id}")
-        OUT.print(f"largest currents {largest} mA (x, y, z)")
+        say(f"{table.name}: {table.points} points in {len(table.bytes)} bytes, id {table.id}")
+        say(f"largest currents {largest} mA (x, y, z)")
         if output:
-            OUT.print(f"written to {output}")
+            say(f"written to {output}")
 
 
 def _shaped(shape: str, values_ut: tuple[float, ...], points: int, axis: str, log: Path | None) -> Trajectory:

@@ -169,8 +169,8 @@ def _noise_unknown(first: Evidence, absent: Absent, shown: list[Pattern]) -> Dia
 def _remains(left: Evidence) -> list[Pattern]:
     """What is significant in a residual: dependence on a covariate by its gain in BIC, and jumps."""
     gain = max((left.gain(columns) for _, _, columns in left.covariates), default=0.0)
-    found = jump_patterns(left)
-    return found + patterns(left) if gain > ENOUGH + 2 * np.log(len(left.covariates)) else found
+    found = patterns(left) if gain > ENOUGH + 2 * np.log(len(left.covariates)) else []
+    return sorted(found + jump_patterns(left), key=lambda pattern: pattern.p_value)
 
 
 def _explainable(found: list[Found], left: Evidence) -> float:

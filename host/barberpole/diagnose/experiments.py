@@ -19,6 +19,7 @@ from barberpole.diagnose.recordings import ROWS, Recording, observed, ordinary, 
 from barberpole.diagnose.table import Design, multiply, parts_of
 from barberpole.effects import Effect
 from barberpole.errors import InputError
+from barberpole.numbers import plain
 
 REST = "record the sensor at rest for 60 s and pass it with --noise"
 PARTED = 5.0  # standard errors that tell two effects apart, or show one
@@ -77,7 +78,7 @@ def settling(first: Evidence, group: tuple[str, ...], extra: Sequence[Effect] = 
     recording, sigmas = max(table, key=lambda row: min(row[1][at] for at, _ in settled))
     names, least = ", ".join(rival for _, rival in settled), min(sigmas[at] for at, _ in settled)
     before = min(now[rival] for _, rival in settled)
-    gain = f"{ROWS} samples part them by {least:.2g} standard errors, this log by {before:.2g}"
+    gain = f"{ROWS} samples part them by {plain(least, 2)} standard errors, this log by {_sure(before)}"
     return f"to tell {group[0]} from {names}: {recording.words} ({gain})"
 
 
@@ -101,8 +102,13 @@ def showing(first: Evidence, blind: Sequence[str], extra: Sequence[Effect] = ())
 
 def _gain(now: float, most: float) -> str:
     if now > PARTED:  # clear of the noise, but too small a part of it to go by
-        return f"{ROWS} samples show it {most / now:.2g} times as clearly"
-    return f"{ROWS} samples show its typical size at {most:.2g} standard errors, this log at {now:.2g}"
+        return f"{ROWS} samples show it {plain(most / now, 2)} times as clearly"
+    return f"{ROWS} samples show its typical size at {plain(most, 2)} standard errors, this log at {_sure(now)}"
+
+
+def _sure(sigmas: float) -> str:
+    """Standard errors; of less than a hundredth nobody wants to know."""
+    return plain(sigmas, 2) if sigmas >= 0.01 else "none"
 
 
 def _between(first: Evidence, name: str, rival: str) -> Question | None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from barberpole.diagnose.evidence import Evidence
-from barberpole.diagnose.tails import LIKELIER, jumps
+from barberpole.diagnose.tails import LIKELIER, dither, jumps
 from barberpole.diagnose.words import shape_in_words
 
 SHOWN = 12  # patterns listed at most
@@ -47,7 +47,7 @@ def _pattern(evidence: Evidence, channel, covariate, columns, score, chance) -> 
 
 def jump_patterns(evidence: Evidence) -> list[Pattern]:
     """Channels that rest on a level and jump to another: no covariate, but no noise either."""
-    found, residual = [], evidence.ground.residual
+    found, residual = [], evidence.ground.residual + dither(evidence.fit.problem.seen.y, len(evidence.ground.axes))
     for channel, gain in enumerate(jumps(residual, evidence.ground.normal)):
         if gain > LIKELIER:
             rms = float(np.sqrt(np.mean(residual[channel] ** 2)))

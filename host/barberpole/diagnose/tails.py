@@ -65,6 +65,23 @@ def jumps(residual: np.ndarray, normal: np.ndarray | None = None) -> np.ndarray:
     return np.array([two_populations(row) for row in change])
 
 
+def dither(readings: np.ndarray, channels: int) -> np.ndarray:
+    """(channels, n) to add to residuals of readings (3, n), so that a converter's levels are no levels of the signal.
+
+    Evenly spread over one step to either side: what rests within the noise of a step jumps by whole ones. Zeros where
+    hardly a reading is there twice.
+    """
+    step = np.array([_step(axis) for axis in readings])
+    step = step if channels == len(step) else np.max(step, keepdims=True)
+    return step[:, None] * np.random.default_rng(0).uniform(-1.0, 1.0, (channels, readings.shape[1]))
+
+
+def _step(readings: np.ndarray) -> float:
+    """The least difference of readings (n,) of which most are there more than once; else 0."""
+    levels = np.unique(readings)
+    return float(np.min(np.diff(levels))) if 1 < levels.size < 0.5 * readings.size else 0.0
+
+
 def _in_steps(rows: np.ndarray) -> np.ndarray:
     """(m, n) -> (m, n / STEP, STEP)."""
     n = rows.shape[1] // STEP

@@ -1,6 +1,7 @@
 """Which board a log is of, from which lot, and when: the board's own word, else the file's name and folder."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 from barberpole.errors import InputError, must
 
 DATE = re.compile(r"[ ._-]?(?P<date>\d{4}-?\d{2}-?\d{2}(?:[T ._-]?\d{2}[:-]?\d{2}(?:[:-]?\d{2})?)?)(?!\d)")
+BY_FOLDER = r"(?P<board>[^/\\]+)[/\\][^/\\]+$"
 GROUPS = ("board", "date", "lot")
 
 
@@ -25,11 +27,19 @@ def identity(path: Path, told: dict[str, Any], pattern: str | None = None) -> Id
 
     pattern     a regular expression searched in the path, with groups named board, date and lot
     """
-    named = _by_pattern(path, pattern)
-    board = told.get("uid") or told.get("board_id") or named.get("board") or DATE.sub("", path.stem) or path.stem
-    lot = told.get("lot") or named.get("lot") or path.absolute().parent.name
+    named, folder = _by_pattern(path, pattern), path.absolute().parent
+    board = told.get("uid") or told.get("board_id") or named.get("board") or DATE.sub("", path.stem)
+    if not board or named.get("board") == folder.name:  # the folder is the board's, its folder the lot's
+        board, folder = board or folder.name, folder.parent
+    lot = told.get("lot") or named.get("lot") or folder.name
     date = told.get("date") or named.get("date")
     return Identity(str(board), str(lot), _compact(str(date)) if date else None)
+
+
+def in_folders(paths: Sequence[str]) -> str | None:
+    """The pattern for logs that all have one name, each in its board's folder (b1/log.csv, b2/log.csv); else None."""
+    names, folders = {Path(path).name for path in paths}, {Path(path).parent for path in paths}
+    return BY_FOLDER if len(names) == 1 and len(folders) > 1 else None
 
 
 def check_pattern(pattern: str) -> str:

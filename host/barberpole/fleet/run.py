@@ -43,7 +43,7 @@ def logs(patterns: Sequence[str]) -> list[str]:
     for pattern in patterns:
         path = Path(pattern)
         if path.is_dir():
-            found |= {str(p) for p in path.iterdir() if p.suffix.lower() in SUFFIXES}
+            found |= {str(p) for p in path.rglob("*") if p.suffix.lower() in SUFFIXES}
         else:
             found |= {p for p in glob.glob(pattern, recursive=True) if Path(p).is_file()}  # noqa: PTH207 (absolute too)
             if path.suffix and not glob.has_magic(pattern):

@@ -17,6 +17,7 @@ from barberpole.fit.fit import MAD
 from barberpole.fleet.lots import LotEffect, lot_effects
 from barberpole.fleet.spread import LEAST, Row, Spread, spreads
 from barberpole.fleet.table import Fleet
+from barberpole.numbers import plain
 
 CHANCE = 0.01  # of one false alarm in a whole fleet
 
@@ -111,8 +112,8 @@ def _apart(row: Row, of: Spread) -> Outlier | None:
         return None
     z = float((value - of.mean) / max(np.hypot(of.tau, error), 1e-300))
     why = (
-        f"{of.name} is {value:.5g} {of.unit}; the lot's is {of.mean:.5g} ± {of.tau:.2g}, "
-        f"this board's is known to {error:.2g}"
+        f"{of.name} is {value:.5g} {of.unit}; the lot's is {of.mean:.5g} ± {plain(of.tau, 2)}, "
+        f"this board's is known to {plain(error, 2)}"
     )
     return Outlier(row["board"], row["log"], of.name, value, of.mean, z, why)
 
@@ -153,7 +154,7 @@ def _changed(board: str, name: str, rows: Sequence[Row]) -> Change | None:
     mean = np.sum(v / s**2) / np.sum(1.0 / s**2)
     p_value = float(max(stats.chi2.sf(np.sum(((v - mean) / s) ** 2), v.size - 1), 1e-300))
     unit, step = having[0]["units"][name], v[-1] - v[0]
-    why = f"{name} went from {v[0]:.5g} to {v[-1]:.5g} {unit}: {step:+.3g} ± {np.hypot(s[0], s[-1]):.2g}"
+    why = f"{name} went from {v[0]:.5g} to {v[-1]:.5g} {unit}: {step:+.3g} ± {plain(float(np.hypot(s[0], s[-1])), 2)}"
     logs, dates = tuple(row["log"] for row in having), tuple(row["date"] for row in having)
     return Change(board, name, unit, logs, dates, tuple(v.tolist()), tuple(s.tolist()), p_value, why)
 

@@ -65,5 +65,6 @@ def ask(port: str, command: str, timeout_s: float = 15.0) -> list[dict]:
                 answers.append(frame.json)
                 if "done" in frame.json:
                     return answers
-    be = f"answering `{command}` within {timeout_s:g} s (main.py running)"
-    raise PortError(must(f"the board on {port}", be, "silence" if not answers else "half an answer"))
+    be = f"answering `{command}` within {timeout_s:g} s"
+    got = "half an answer" if answers else "silence: its program is not running (a power cycle or `record` starts it)"
+    raise PortError(must(f"the board on {port}", be, got))

@@ -27,7 +27,8 @@ def run(port: str, *words: str, timeout_s: float = TIMEOUT_S) -> str:
 def require_port(port: str) -> None:
     """Raise PortError if the port does not exist (names such as /dev/ttyACM0; `auto` is left to mpremote)."""
     if port.startswith("/") and not Path(port).exists():
-        raise PortError(must("the port", "an attached board", f"{port}, which does not exist"))
+        got = f"{port}, which does not exist (`barberpole doctor` lists boards, `barberpole twin` emulates one)"
+        raise PortError(must("the port", "an attached board", got))
 
 
 def copy(port: str, files: Sequence[tuple[Path, str]], first: str = "") -> None:
