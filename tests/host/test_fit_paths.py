@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from barberpole.challenge.record import Recipe, record
 from barberpole.errors import InputError
+from barberpole.fit import residual
 from barberpole.fit.affine import moments
 from barberpole.fit.few import ENOUGH, few
-from barberpole.fit.fit import Fit, fit_log
+from barberpole.fit.fit import Fit, fit_log, fit_observations
 from barberpole.fit.gram import accumulate, solve_scaled
 from barberpole.fit.honest import factors
 from barberpole.fit.usable import require_one_field
@@ -32,13 +33,27 @@ def test_residuals_in_one_product_are_those_sample_by_sample(reference):
 def test_sums_of_neighbours_need_no_residual():
     fit = fitted("vector")
     summed, squares = fit.problem.neighbours(fit.p)
-    residual = fit.problem.residual(fit.p)
-    assert summed.shape == (3, residual.shape[1] // 8)
-    assert np.allclose(summed[:, 7], residual[:, 56:64].sum(axis=1), atol=1e-8)
-    assert np.allclose(squares, np.sum(residual**2, axis=1), rtol=1e-9)
+    left = fit.problem.residual(fit.p)
+    assert summed.shape == (3, left.shape[1] // 8)
+    assert np.allclose(summed[:, 7], left[:, 56:64].sum(axis=1), atol=1e-8)
+    assert np.allclose(squares, np.sum(left**2, axis=1), rtol=1e-9)
     by_residual = replace(fit.problem, moments=None).neighbours(fit.p)
     assert np.allclose(summed, by_residual[0], atol=1e-8)
     assert np.allclose(squares, by_residual[1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("noise_lsb", [0.3, 1.5, 3.0])
+@pytest.mark.parametrize("n", [300, 10_000])
+def test_a_last_step_without_a_pass_ends_where_another_would(monkeypatch, n, noise_lsb):
+    """Noise of 0.2, 1 and 2 % of the field; a hundredth of a standard error is promised, of the noise too."""
+    seen = turned(n, "constant")
+    loud = replace(seen, y=seen.y + noise_lsb * np.random.default_rng(n).normal(size=seen.y.shape))
+    short = fit_observations(loud, model_of(BASE))
+    monkeypatch.setattr(residual, "NEAR", 0.0)
+    long = fit_observations(loud, model_of(BASE))
+    assert short.converged
+    assert np.max(np.abs(short.p - long.p) / long.stderr) < 0.01
+    assert short.rms_lsb == pytest.approx(long.rms_lsb, rel=0.01 / np.sqrt(2 * n))
 
 
 def test_moments_give_the_normal_equations_of_a_pass():

@@ -20,10 +20,13 @@ class Curve:
 
     vector = True
 
-    def __init__(self, function, slope, data, lower, upper, affine=False):
-        self._function, self._slope, self._data, self.affine = function, slope, data, affine
+    def __init__(self, function, slope, data, lower, upper, straight=0.0):
+        self._function, self._slope, self._data, self._straight = function, slope, data, straight
         self.model = SimpleNamespace(bounds=lambda: (lower, upper))
         self.n, self.largest, self.passes = len(data), float(np.max(np.abs(data))), 0
+
+    def straight(self, rms):
+        return self._straight
 
     def residual(self, p):
         return self._data - self._function(p)
@@ -41,7 +44,7 @@ def line(seed, lower=-WIDE, upper=WIDE):
     rng = np.random.default_rng(seed)
     matrix = (rng.normal(size=(N, 5)) + rng.normal(size=(N, 1))) * np.array([1.0, 30.0, 0.01, 5.0, 200.0])
     data = matrix @ (rng.normal(size=5) / np.abs(matrix).max(axis=0)) + 0.1 * rng.normal(size=N)
-    return matrix, data, Curve(lambda p: matrix @ p, lambda p: matrix, data, lower, upper, affine=True)
+    return matrix, data, Curve(lambda p: matrix @ p, lambda p: matrix, data, lower, upper, 1e-4)
 
 
 ALL = np.ones(5, bool)
@@ -102,7 +105,7 @@ def test_where_no_step_helps_it_stays_and_says_so():
     problem = line(3)[2]
     first = problem.gram(np.zeros(5))
     nothing = replace(first, rr=np.full(BLOCKS, np.nan))
-    broken = SimpleNamespace(model=problem.model, vector=True, affine=True, n=N, largest=1.0, passes=0)
+    broken = SimpleNamespace(model=problem.model, vector=True, straight=lambda rms: 1e-4, n=N, largest=1.0, passes=0)
 
     def gram(p, sigma=0.0, tick=None):
         broken.passes += 1

@@ -21,6 +21,8 @@ from barberpole.observations import Observations
 
 CHUNK = 4096  # samples at a time: the working set stays in the cache, and memory does not grow with the log
 Linearised = tuple[np.ndarray, np.ndarray, np.ndarray | None]
+NEAR = 0.01
+MOST = 0.01  # of the cost: further away the normal equations say little
 DIFFERENCE = 1e-6  # of a parameter's size: step of a numerical derivative
 
 
@@ -65,6 +67,20 @@ class Problem:
     def affine(self) -> bool:
         """Whether every sample sees the same matrix and constant."""
         return is_affine(self.model, self.seen.at)
+
+    def straight(self, rms: float) -> float:
+        """Relative fall of the cost of a step after which another would be NEAR standard errors long; 0: not known.
+
+        The surface |B| = K bends over its own size only. There a step of k standard errors e leaves k^2 e / size.
+        """
+        if self.vector or not self.affine:
+            return 0.0
+        return min(NEAR * self.extent / (3.0 * max(rms, 1e-300) * np.sqrt(self.n)), MOST)
+
+    @cached_property
+    def extent(self) -> float:
+        """Half the range of the readings of the axis with the smallest, LSB."""
+        return 0.5 * float(np.min(np.ptp(self.seen.y, axis=1)))
 
     @cached_property
     def largest(self) -> float:

@@ -15,7 +15,6 @@ MAX_STEPS = 40
 TOLERANCE = 1e-10  # relative fall of the cost that is still a step
 ROUGH = 1e-2  # the same while the noise is not yet known: it is then known well enough to go on
 MOST_DAMPED = 1e8  # beyond it no step helps
-STRAIGHT = 1e-4  # TOLERANCE where the surface bends over its own size only: the rest of such a step is below 1e-4 sigma
 LAST = 1e-8  # relative fall of the cost of a step so short that nothing bends on its way
 SAME_NOISE = 0.01  # relative change of the noise that needs no further pass
 ROUNDING = 1e-13  # of the largest reading: below this a residual is arithmetic, not data
@@ -38,19 +37,19 @@ class Solution:
 
 
 class Measured(Protocol):
-    """What a fit needs of a problem: n samples, the largest reading in LSB, whether every sample sees the same matrix
-    and constant, and the normal equations at any p."""
+    """What a fit needs of a problem: n samples, the largest reading in LSB, the normal equations at any p, and how much
+    of the cost a step may take that needs no pass over the log after it, at a noise in LSB."""
 
     @property
     def model(self) -> Model: ...
     @property
     def vector(self) -> bool: ...
     @property
-    def affine(self) -> bool: ...
-    @property
     def n(self) -> int: ...
     @property
     def largest(self) -> float: ...
+
+    def straight(self, rms: float) -> float: ...
 
     def gram(self, p: np.ndarray, sigma: float = 0.0, tick: Tick = None) -> Gram: ...
 
@@ -71,8 +70,8 @@ def minimise(
         sigma = solution.gram.rms()
         if abs(sigma - solution.gram.sigma) <= SAME_NOISE * sigma:
             break
-        fine = STRAIGHT if problem.affine else TOLERANCE
-        solution = descend(problem, solution.p, free, solution.gram.at_noise(sigma), fine, tick)
+        short = max(problem.straight(sigma), TOLERANCE)
+        solution = descend(problem, solution.p, free, solution.gram.at_noise(sigma), short, tick)
     return solution
 
 
@@ -90,9 +89,8 @@ def descend(problem: Measured, p: np.ndarray, free: np.ndarray, gram: Gram, tole
         movable = free & ~_held_by_bound(p, gram, lower, upper)
         step, predicted = _step(gram, movable, damping)
         if predicted <= tolerance * gram.cost + floor:
-            if floor < predicted <= (STRAIGHT if problem.affine else LAST) * gram.cost and np.all(
-                (p + step >= lower) & (p + step <= upper)
-            ):
+            inside = np.all((p + step >= lower) & (p + step <= upper))
+            if inside and floor < predicted <= max(problem.straight(gram.rms()), LAST) * gram.cost:
                 p, gram = p + step, gram.moved(step)
             return Solution(p, gram, free, True)
         trial_p = np.clip(p + step, lower, upper)

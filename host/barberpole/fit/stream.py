@@ -40,10 +40,9 @@ class Streamed:
     def vector(self) -> bool:
         return self.like.vector
 
-    @property
-    def affine(self) -> bool:
-        """Steps are followed to the end: a fit in memory differs by rounding only."""
-        return False
+    def straight(self, rms: float) -> float:
+        """Steps are followed to the end, whatever the noise."""
+        return 0.0
 
     @property
     def n(self) -> int:
