@@ -1,10 +1,12 @@
 """Which tests run a line, by coverage.py's contexts: measured once, kept in build/mutation."""
 
 import ast
+import itertools
 import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from functools import cached_property
 from pathlib import Path
 
@@ -77,15 +79,20 @@ class Covering:
         if measured is None:
             return []
         by_line = self._read.contexts_by_lineno(measured)
-        names = {c for number in _statement(text, line) for c in by_line.get(number, ())} - {""}
-        names = names or {c for contexts in by_line.values() for c in contexts}
-        taken, spent = [], 0.0
-        for test in sorted(names & set(self.seconds), key=lambda test: (self.seconds[test], test)):
-            spent += self.seconds[test]
-            if spent > most_s and taken:
-                break
-            taken.append(test)
-        return taken
+        ran = Counter(test for tests in by_line.values() for test in tests if test in self.seconds)
+        names = {c for number in _statement(text, line) for c in by_line.get(number, ())} & set(ran)
+        if names and _is_called(text, line):
+            ordered = sorted(names, key=lambda test: (self.seconds[test], test))
+        else:  # first those that run most of the file
+            ordered = sorted(ran, key=lambda test: (-ran[test], self.seconds[test], test))
+        sums = itertools.accumulate(self.seconds[test] for test in ordered)
+        return [test for at, (test, spent) in enumerate(zip(ordered, sums, strict=True)) if at == 0 or spent <= most_s]
+
+
+def _is_called(text: str, line: int) -> bool:
+    """Whether the line is in the body of a function, and not run by whoever imports the module."""
+    functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
+    return any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in functions)
 
 
 def _statement(text: str, line: int) -> range:
