@@ -61,12 +61,15 @@ class Design:
             out = np.ones((len(self.parts), n // 2 + 1))
             out[:, :EMPTIED] = 0.0
             return out
-        channels = zip(self.parts, products.channels, strict=True)
-        return np.stack([_kept(np.concatenate([r for _, r in parts[:-1]]), gram) for parts, (_, gram) in channels])
+        out = []
+        for parts, (numbers, gram) in zip(self.parts, products.channels, strict=True):
+            taken = numbers != self.count - 1  # the last is not there where a channel has no residual at all
+            columns = np.concatenate([rows for _, rows in parts])[taken]
+            out.append(_kept(columns, gram.sum(axis=0)[np.ix_(taken, taken)]))
+        return np.stack(out)
 
 
-def _kept(columns: np.ndarray, gram: np.ndarray) -> np.ndarray:
-    total = gram.sum(axis=0)[:-1, :-1]
+def _kept(columns: np.ndarray, total: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.maximum(np.diag(total), 1e-300))
     values, vectors = np.linalg.eigh(total / np.outer(size, size))
     used = values > ALIKE
