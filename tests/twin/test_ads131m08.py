@@ -4,8 +4,9 @@ import binascii
 
 import pytest
 from barberpole.twin import Fixed, World
-from barberpole.twin.ads131m08 import FRAME_BYTES, NEVER_US, START_US, Ads131m08
+from barberpole.twin.ads131m08 import NEVER_US, START_US, Ads131m08
 from barberpole.twin.analog import AnalogInputs
+from barberpole.twin.frames import FRAME_BYTES
 from barberpole.twin.noise import Noise, NoiseLevel
 from barberpole.twin.sensor_head import INPUTS, SensorHead
 

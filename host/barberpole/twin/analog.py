@@ -18,18 +18,22 @@ from barberpole.twin.world import World
 
 FILTER_PERIODS = 3  # length of a sinc3's impulse response
 LONGEST_PERIOD_US = 4000.0  # of the converter's data rates
+WAITING_US = 8000.0  # for so long a conversion may wait to be computed
 CONVERTER_NOISE_V = 8e-6  # ADS131M08 at gain 1 and 8 kHz, rms of one conversion (data sheet, noise table, about)
 
 
 class Head(Protocol):
     """What the inputs look at."""
 
+    still_s: tuple[float, float]
+    """s. A stretch of time in which nothing that the voltages hang on moves by itself, as far as it was looked at."""
+
     def volts(self, t_s: float) -> list[float]:
         """Voltage on every input at t_s, without noise; the same list while nothing changes, or a new one."""
         ...
 
-    def still_until(self, t_s: float) -> float:
-        """Time in s before which what the voltages hang on is known not to move by itself."""
+    def coming(self, times_s: Sequence[float]) -> list[list[float]]:
+        """Voltages at times to come, up to the first that cannot be told; nothing is changed by asking."""
         ...
 
 
@@ -39,7 +43,7 @@ class AnalogInputs:
     def __init__(self, head: Head, noise: Noise):
         self.head = head
         self._noise = noise
-        self._steps: list[tuple[float, list[float]]] = []
+        self._steps: list[tuple[float, np.ndarray]] = []
 
     def change(self, t_us: float, act: Callable[[], None]) -> None:
         """Do `act` to the head at t_us and remember the steps that its voltages make."""
@@ -48,44 +52,37 @@ class AnalogInputs:
         act()
         after = self.head.volts(t_s)
         if after is not before:
-            self._forget(t_us, LONGEST_PERIOD_US)
-            self._steps.append((t_us, [b - a for a, b in zip(before, after, strict=True)]))
+            oldest_us = t_us - WAITING_US - FILTER_PERIODS * LONGEST_PERIOD_US
+            self._steps = [step for step in self._steps if step[0] > oldest_us]
+            self._steps.append((t_us, np.subtract(after, before)))
 
-    def ahead(self, ends_us: Sequence[float], period_us: float) -> np.ndarray:
-        """Volts (n, INPUTS) of the conversions that end then, up to the first that cannot be told before its time."""
-        count = len(ends_us)
-        while count and not (t_s := self._middle_s(ends_us[count - 1], period_us)) < self.head.still_until(t_s):
-            count -= 1
+    def will_know(self, end_us: float, t_us: float) -> bool:
+        """Whether a conversion that ended at end_us can still be computed after t_us."""
+        start_s, until_s = self.head.still_s
+        begin_s = (end_us - FILTER_PERIODS * LONGEST_PERIOD_US) * 1e-6
+        return t_us - end_us < WAITING_US and start_s <= begin_s and t_us * 1e-6 < until_s
+
+    def volts(self, ends_us: Sequence[float], completed: int, period_us: float) -> np.ndarray:
+        """Volts (n, INPUTS) of the conversions that end then: of those that are complete, the first in the row, and
+        of the others up to the first that cannot be told before its time."""
+        volts = self._unfiltered([(end_us - 0.5 * FILTER_PERIODS * period_us) * 1e-6 for end_us in ends_us], completed)
+        count = len(volts)
         if not count:
-            return np.empty((0, INPUTS))
-        volts = np.array(self.head.volts(self._middle_s(ends_us[0], period_us)))
-        noise = self._noise.rows(int(ends_us[0] // period_us), count)  # the periods are binary fractions: no gap
+            return volts
         for at_us, delta in self._steps:
             if ends_us[0] - at_us < FILTER_PERIODS * period_us:
                 missing = [[1.0 - sinc3_step((end_us - at_us) / period_us)] for end_us in ends_us[:count]]
                 volts = volts - np.array(missing) * delta
-        return volts + noise
+        return volts + self._noise.rows([int(end_us // period_us) for end_us in ends_us[:count]])
 
-    def converted(self, end_us: float, period_us: float) -> list[float]:
-        """Volts of the conversion that ends at end_us, one per input."""
-        volts = self.head.volts(self._middle_s(end_us, period_us))
-        if self._steps:
-            volts = self._unsettled(volts, end_us, period_us)
-        noise = self._noise.at(int(end_us // period_us))
-        return [v + n for v, n in zip(volts, noise, strict=True)]
-
-    def _middle_s(self, end_us: float, period_us: float) -> float:
-        return (end_us - 0.5 * FILTER_PERIODS * period_us) * 1e-6
-
-    def _unsettled(self, volts: list[float], end_us: float, period_us: float) -> list[float]:
-        self._forget(end_us, period_us)
-        for at_us, delta in self._steps:
-            missing = 1.0 - sinc3_step((end_us - at_us) / period_us)
-            volts = [v - missing * d for v, d in zip(volts, delta, strict=True)]
-        return volts
-
-    def _forget(self, t_us: float, period_us: float) -> None:
-        self._steps = [step for step in self._steps if t_us - step[0] < FILTER_PERIODS * period_us]
+    def _unfiltered(self, times_s: list[float], completed: int) -> np.ndarray:
+        """Volts (n, INPUTS) at these times, as far as they can be told; the first `completed` of them are over."""
+        start_s, until_s = self.head.still_s
+        if start_s <= times_s[0] and times_s[-1] < until_s:
+            return np.array([self.head.volts(times_s[0])] * len(times_s))
+        past = [self.head.volts(t_s) for t_s in times_s[:completed]]
+        future = self.head.coming(times_s[completed:]) if len(times_s) > completed else []
+        return np.array(past + future).reshape(-1, INPUTS)
 
 
 def noise_level(board: Board, world: World) -> NoiseLevel:

@@ -14,6 +14,7 @@ from barberpole.driver_board import Driver
 from barberpole.twin.ads131m08 import Ads131m08
 from barberpole.twin.analog import CONVERTER_NOISE_V, AnalogInputs
 from barberpole.twin.dac80504 import Dac80504
+from barberpole.twin.frames import NOTHING, Ahead
 from barberpole.twin.noise import Noise, NoiseLevel
 from barberpole.twin.pins import PINS, bus_number
 from barberpole.twin.sensor_head import AXES, INPUTS
@@ -50,6 +51,7 @@ class DrivenCoils:
     def __init__(self, driver: Driver, world: CoilWorld, faults: frozenset[str]):
         self.driver, self.world, self.faults = driver, world, faults
         self.share = [0.0, 0.0, 0.0]
+        self.still_s = (0.0, 0.0)
 
     def drive(self, axis: int, share: float) -> None:
         """Put a share of the full voltage across a coil."""
@@ -61,14 +63,15 @@ class DrivenCoils:
 
     def volts(self, t_s: float) -> list[float]:
         """Voltage on every input of the converter, without noise."""
+        self.still_s = (t_s, self.world.temperature.constant_until(t_s))
         volts, channels = [0.0] * INPUTS, self.driver.adc.channels
         for name, current_ma in zip(AXES, self.current_ma(t_s), strict=True):
             volts[getattr(channels, f"coil_{name}")] = 1e-3 * current_ma * self.driver.adc.coil_shunt_ohm
         return volts
 
-    def still_until(self, t_s: float) -> float:
-        """Time in s before which the temperature stays as it is at t_s."""
-        return self.world.temperature.constant_until(t_s)
+    def coming(self, times_s: Sequence[float]) -> list[list[float]]:
+        """Voltages at times to come."""
+        return [self.volts(t_s) for t_s in times_s]
 
 
 class Wired:
@@ -111,14 +114,13 @@ class Wired:
         """When the converter's data-ready goes low, µs."""
         return self._adc.ready_at(t_us)
 
-    def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
-        """Frames that the converter will say next, as of Wiring."""
-        return self._adc.ahead(most) if self._selected[self._driver.adc.cs_pin] else ((), b"")
+    def ahead(self, most: int) -> Ahead:
+        """Frames that the converter will say next."""
+        return self._adc.ahead(most) if self._selected[self._driver.adc.cs_pin] else NOTHING
 
     def take(self, count: int) -> None:
         """So many of them were read."""
-        for _ in range(count):
-            self._adc.take()
+        self._adc.take(count)
 
     def take_charge_us(self) -> int:
         """Its arithmetic fits into the hold, which is timed."""

@@ -6,6 +6,7 @@ slowest and the fastest corner); skipped blocks are jumped over exactly.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,10 +33,9 @@ class Noise:
     def __init__(self, level: NoiseLevel, seed: int, power_up: int):
         self._level = level
         self._key = (seed, power_up)
-        self._first = -1
-        self._rows: list[list[float]] = []
-        self._block = np.empty((0, 0))  # the same
-        self._former: tuple[int, list[list[float]]] = (-1, [])  # 1/f noise cannot be drawn backwards
+        self._first = -BLOCK
+        self._block = np.empty((0, 0))
+        self._former = (-BLOCK, self._block)  # 1/f noise cannot be drawn backwards
         self._has_flicker = any(level.flicker_v2)
         self._taus_s = FASTEST_S * RATIO ** np.arange(1 + math.log(SLOWEST_S / FASTEST_S, RATIO))
         self._slow = np.zeros((len(self._taus_s), len(level.white_v)))
@@ -43,31 +43,35 @@ class Noise:
         steps = np.exp(-level.period_s / self._taus_s) if self._has_flicker else ()
         self._memory = [_low_pass(step) for step in steps]
 
-    def at(self, index: int) -> list[float]:
-        """Volts on every input at conversion `index`."""
-        row = index - self._first
-        if self._first < 0 or not 0 <= row < BLOCK:
-            if 0 <= index - self._former[0] < BLOCK and self._former[1]:
-                return self._former[1][index - self._former[0]]
-            self._former = (self._first, self._rows)
-            self._draw(index // BLOCK)
-            row = index - self._first
-        return self._rows[row]
+    def at(self, index: int) -> np.ndarray:
+        """Volts (inputs,) at conversion `index`."""
+        return self.rows([index])[0]
 
-    def rows(self, index: int, count: int) -> np.ndarray:
-        """Volts (count, inputs) at conversion `index` and those after it."""
-        at = index - self._first
-        if self._first >= 0 and 0 <= at <= BLOCK - count:
-            return self._block[at : at + count]
-        return np.array([self.at(index + i) for i in range(count)])
+    def rows(self, indices: Sequence[int]) -> np.ndarray:
+        """Volts (n, inputs) at the conversions `indices`, which ascend."""
+        first, last = indices[0] - self._first, indices[-1] - self._first
+        if first < 0 or last >= BLOCK:
+            return np.array([self._block_of(index)[index % BLOCK] for index in indices])
+        if last - first == len(indices) - 1:
+            return self._block[first : last + 1]
+        return self._block[[index - self._first for index in indices]]
+
+    def _block_of(self, index: int) -> np.ndarray:
+        """The block that a conversion is in."""
+        place = index // BLOCK * BLOCK
+        if place == self._former[0]:
+            return self._former[1]
+        if place != self._first:
+            self._former = (self._first, self._block)
+            self._draw(index // BLOCK)
+        return self._block
 
     def _draw(self, block: int) -> None:
         random = np.random.default_rng((*self._key, block))
         volts = random.standard_normal((BLOCK, len(self._level.white_v))) * self._level.white_v
         if self._has_flicker:
             volts += self._flicker(random, block * BLOCK)
-        self._first = block * BLOCK
-        self._block, self._rows = volts, volts.tolist()
+        self._first, self._block = block * BLOCK, volts
 
     def _flicker(self, random: np.random.Generator, first: int) -> np.ndarray:
         """The next block (BLOCK, inputs) in V of the sum of low-pass noises."""

@@ -4,7 +4,7 @@ Also charges the time that MicroPython's arithmetic takes on the real microcontr
 self-calibration point when its coil currents change, of a streamed row after the last sample of its RESET half.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -15,6 +15,7 @@ from barberpole.twin.analog import AnalogInputs, noise_level
 from barberpole.twin.array_world import ArrayWorld
 from barberpole.twin.dac80504 import Dac80504
 from barberpole.twin.faults import of_sensor
+from barberpole.twin.frames import FRAME_BYTES, NOTHING, Ahead
 from barberpole.twin.noise import Noise
 from barberpole.twin.pins import PINS, bus_number
 from barberpole.twin.sensor_head import AXES, SensorHead
@@ -90,7 +91,7 @@ class Soldered:
             if self._selected[pin]:
                 answer = chip.exchange(t_us, data)
                 if self._row_samples >= 0 and chip is self._adc:
-                    self._count_sample()
+                    self._count_samples([self._adc.delivered_us])
                 return answer
         return bytes((FLOATING,)) * len(data)
 
@@ -98,23 +99,28 @@ class Soldered:
         """When the converter's data-ready goes low, µs."""
         return self._adc.ready_at(t_us)
 
-    def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
-        """Frames that the converter will say next, as of Wiring; the one that ends a row is not among them.
+    def ahead(self, most: int) -> Ahead:
+        """Frames that the converter will say next, up to the one that ends a row.
 
         None of an array: its converters are read in turn.
         """
         if self.board.members or not self._selected[PINS.index(self.board.adc.cs_pin)]:
-            return (), b""
-        if self._row_samples >= 0:
-            most = min(most, self.board.adc.samples_per_half - 1 - self._row_samples)
-        return self._adc.ahead(most)
+            return NOTHING
+        told = self._adc.ahead(most)
+        if self._row_samples < 0:
+            return told
+        old = told.count - self._settled(self._adc.coming_us(told.count))
+        left = old + self.board.adc.samples_per_half - self._row_samples
+        if left > told.count:
+            return told
+        row_us = round(self.board.timing.python_us_per_row)
+        return Ahead(told.ready_us[: left + 2], told.frames[: left * FRAME_BYTES], row_us)
 
     def take(self, count: int) -> None:
         """So many of them were read."""
-        for _ in range(count):
-            self._adc.take()
-            if self._row_samples >= 0:
-                self._count_sample()
+        if self._row_samples >= 0:
+            self._count_samples(self._adc.coming_us(count))
+        self._adc.take(count)
 
     def take_charge_us(self) -> int:
         """Time that arithmetic has taken since the last call, µs."""
@@ -173,11 +179,15 @@ class Soldered:
                 for sensor in self.sensors:
                     sensor.head.jump_field(self._driven_at + STEP_DELAY_S)
 
-    def _count_sample(self) -> None:
-        if self._adc.delivered_us >= self._flip.last_us + self.board.flip.settle_us:
-            self._row_samples += 1
-            if self._row_samples == self.board.adc.samples_per_half:
-                self._charge_row()
+    def _settled(self, ends_us: list[float]) -> int:
+        """How many of the conversions that end then belong to the row: those after settling."""
+        settled_us = self._flip.last_us + self.board.flip.settle_us
+        return sum(end_us >= settled_us for end_us in ends_us)
+
+    def _count_samples(self, ends_us: list[float]) -> None:
+        self._row_samples += self._settled(ends_us)
+        if self._row_samples >= self.board.adc.samples_per_half:
+            self._charge_row()
 
     def _charge_row(self) -> None:
         self._charge_us += round(self.board.timing.python_us_per_row)

@@ -1,7 +1,7 @@
 """The interpreter's requests, decoded and answered (the format stands in shims/_twin.py).
 
 A request costs two turns between the processes, so the answer to a read of the converter brings along what the next
-reads will find, as many as were used of the last such offer and one more.
+reads will find: twice as many as the last time where all of those were used, else one more than were.
 """
 
 import contextlib
@@ -11,12 +11,14 @@ import select
 import struct
 from collections.abc import Callable
 
+from barberpole.twin.frames import NOTHING
 from barberpole.twin.wiring import Wiring
 
 WORD = 8
 MOST_AHEAD = 15
 _HEAD = struct.Struct("<qq")
 _ANSWER = struct.Struct("<qqq")
+_TIMES = tuple(struct.Struct(f"<{count}q") for count in range(MOST_AHEAD + 3))
 
 
 class Op(enum.IntEnum):
@@ -33,7 +35,7 @@ class Wire:
         self._on_op = on_op
         self.now_us = now_us
         self.interrupt = False
-        self._most_ahead, self._offered = 1, False
+        self._most_ahead, self._offered = 1, 0
         from_board, to_here = os.pipe()
         from_here, to_board = os.pipe()
         self.far_ends = (to_here, from_here)
@@ -93,19 +95,20 @@ class Wire:
         return bool(poll.poll(0))
 
     def _take(self, count: int) -> None:
-        """The program has had so many of the frames that were offered."""
+        """The program has had so many of the frames that were offered, and what the last of them costs."""
         self._soldered.take(count)
-        self._most_ahead = min(max(count + 1, self._most_ahead - 1), MOST_AHEAD)
-        self._offered = False
+        self._soldered.take_charge_us()
+        wanted = 2 * self._most_ahead if count == self._offered else max(count + 1, self._most_ahead - 1)
+        self._most_ahead, self._offered = min(wanted, MOST_AHEAD), 0
 
     def _reply(self, now_us: int, answer: bytes, op: int) -> None:
         self.now_us = now_us + self._soldered.take_charge_us()
         ready_us = self._soldered.ready_at(self.now_us)
         time_us = self.now_us
-        ahead_us, frames = self._soldered.ahead(self._most_ahead) if op == Op.SPI else ((), b"")
-        self._offered = bool(frames)
+        told = self._soldered.ahead(self._most_ahead) if op == Op.SPI else NOTHING
+        self._offered = told.count
         if self.interrupt and op != Op.FLASH:  # a file system is not left half way
             time_us, self.interrupt = ~self.now_us, False
-        answer = _ANSWER.pack(time_us, ready_us, max(len(ahead_us) - 2, 0)) + answer
+        answer = _ANSWER.pack(time_us, ready_us, told.count | told.charge_us << 4) + answer
         with contextlib.suppress(BrokenPipeError):  # killed meanwhile
-            os.write(self._reply_to, answer + struct.pack(f"<{len(ahead_us)}q", *ahead_us) + frames)
+            os.write(self._reply_to, answer + _TIMES[len(told.ready_us)].pack(*told.ready_us) + told.frames)

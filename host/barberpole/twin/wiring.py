@@ -1,6 +1,5 @@
 """The roles of an emulated board behind one face: a sensor board, with one sensor or an array, or a coil driver."""
 
-from collections.abc import Sequence
 from typing import Protocol
 
 from barberpole.board import Board
@@ -8,6 +7,7 @@ from barberpole.driver_board import Driver
 from barberpole.errors import InputError, must
 from barberpole.twin.array_world import ArrayWorld
 from barberpole.twin.driven import CoilWorld, Wired
+from barberpole.twin.frames import Ahead
 from barberpole.twin.soldered import Soldered
 from barberpole.twin.world import World
 
@@ -34,15 +34,12 @@ class Wiring(Protocol):
         """When the converter's data-ready goes low."""
         ...
 
-    def ahead(self, most: int) -> tuple[Sequence[int], bytes]:
-        """Up to `most` frames that the converter will say next if nothing but its chip select moves.
-
-        Their times of data-ready and two more of those in µs, and the frames; nothing where that cannot be told.
-        """
+    def ahead(self, most: int) -> Ahead:
+        """Up to `most` frames that the converter will say next; none where that cannot be told."""
         ...
 
     def take(self, count: int) -> None:
-        """The program has read so many of the frames of the last `ahead`, each in its time."""
+        """The program has read so many of the frames of the last `ahead`, each in its time. May charge for them."""
         ...
 
     def take_charge_us(self) -> int:

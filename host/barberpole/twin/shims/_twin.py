@@ -4,8 +4,9 @@
 # Words of 64 bits, both ways:
 #   request: op | frames taken << 4 | (bus | SPI mode << 4) << 8 | pin changes << 16 | bytes sent << 28 |
 #            bytes wanted << 44;  time in µs;  each pin change as time << 16 | pin << 8 | level;  the bytes sent
-#   answer:  time in µs (its complement: Ctrl-C was pressed);  time of data-ready in µs;  number of frames ahead;  the
-#            bytes wanted;  the frames' times of data-ready and two more of those;  the frames
+#   answer:  time in µs (its complement: Ctrl-C was pressed);  time of data-ready in µs;  number of frames ahead | µs of
+#            arithmetic after the last of them << 4;  the bytes wanted;  the frames' times of data-ready and two more of
+#            those;  the frames
 # Frames ahead are what the converter says next if nothing but its chip select moves. A read that finds what such a
 # frame is for is answered from it, without a request; the next request says how many were taken.
 import json
@@ -56,12 +57,13 @@ _ready_parts = tuple([memoryview(_readies)[: n + 2] for n in range(_MOST + 1)])
 _frame_parts = tuple([memoryview(_frames)[: _FRAME * n] for n in range(_MOST + 1)])
 _frame = tuple([memoryview(_frames)[_FRAME * n : _FRAME * (n + 1)] for n in range(_MOST)])
 _ahead = _taken = 0  # frames there, and used
+_charge = 0  # when the last is
 _ahead_bus = -1
 _select, _deselect = setup["adc_cs"] << 8, setup["adc_cs"] << 8 | 1
 
 
 def exchange(op, bus=0, out=None, into=None):
-    global now, _changes, _ready, _sync_at, _ahead, _taken, _ahead_bus
+    global now, _changes, _ready, _sync_at, _ahead, _taken, _ahead_bus, _charge
     sent = len(out) if out is not None else 0
     wanted = len(into) if into is not None else 0
     _request[0] = op | _taken << 4 | bus << 8 | _changes << 16 | sent << 28 | wanted << 44
@@ -73,7 +75,8 @@ def exchange(op, bus=0, out=None, into=None):
     _from.readinto(_answer)
     if wanted:
         _from.readinto(into)
-    _taken, _ahead, _ahead_bus = 0, _answer[2], bus
+    _taken, _ahead, _ahead_bus = 0, _answer[2] & 0xF, bus
+    _charge = _answer[2] >> 4
     if _ahead:
         _from.readinto(_ready_parts[_ahead])
         _from.readinto(_frame_parts[_ahead])
@@ -148,7 +151,7 @@ def transfer(bus, bits_per_s, out, into, size):
 
 
 def take(out, into):  # whether this read is the one that the next frame ahead is for
-    global _changes, _taken, _ready
+    global now, _changes, _taken, _ready
     if _changes != 2 or _request[2] & 0xFFFF != _deselect or _request[3] & 0xFFFF != _select:
         return False
     if into is None or len(into) != _FRAME or not _readies[_taken] <= now < _readies[_taken + 2]:
@@ -159,4 +162,6 @@ def take(out, into):  # whether this read is the one that the next frame ahead i
     _changes = 0
     _taken += 1
     _ready = _readies[_taken]
+    if _taken == _ahead:
+        now += _charge
     return True
