@@ -44,10 +44,12 @@ def test_a_streamed_fit_is_the_fit_in_memory(tmp_path, suffix, reference, form):
     assert streamed.model.names == whole.model.names
     assert np.array_equal(streamed.free, whole.free)
     assert streamed.converged
-    # what bends within the last step is left: little of a vector fit, 1e-4 standard errors against a magnitude
+    # what bends within the last step is left: little of a vector fit, 1e-3 standard errors here against a magnitude
     near = 1e-8 if reference == "vector" else 1e-6
-    assert np.all(np.abs(streamed.p - whole.p) <= near * np.maximum(np.abs(whole.p), whole.stderr))
-    assert streamed.covariance == pytest.approx(whole.covariance, rel=1e-4, abs=1e-9 * np.max(whole.covariance))
+    apart = near * np.maximum(np.abs(whole.p), whole.stderr) if reference == "vector" else 1e-3 * whole.stderr
+    assert np.all(np.abs(streamed.p - whole.p) <= apart)
+    by_one = np.outer(whole.stderr, whole.stderr)
+    assert np.max(np.abs(streamed.covariance - whole.covariance) / by_one) < (1e-6 if reference == "vector" else 1e-3)
     for name in ("n", "rms_ut", "noise_lsb", "b_max_ut", "temp_c"):
         assert getattr(streamed.figures, name) == pytest.approx(getattr(whole.figures, name), rel=near), name
     assert (streamed.rms_norm_percent() is None) == (reference == "vector")
