@@ -2,6 +2,7 @@
 
     BarberpoleError         the command line turns it into one line on stderr and exit 2
     ├── InputError          a file, a column, a key or an argument is not what it must be
+    │   └── CoverageError   sound readings, but too few or turned too little: a diagnosis is inconclusive, not refused
     ├── LimitError          a board is asked for what its parts cannot do: current, time, range
     └── PortError           a board cannot be reached, or does not answer as it must
 
@@ -17,6 +18,10 @@ class BarberpoleError(Exception):
 
 class InputError(BarberpoleError):
     """What was read is not what it must be."""
+
+
+class CoverageError(InputError):
+    """The readings are not wrong; they do not carry an answer."""
 
 
 class LimitError(BarberpoleError):

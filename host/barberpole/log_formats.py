@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,24 +23,26 @@ MOST_NUMBERS = 500_000_000  # 4 GB
 # A small Parquet file may claim any number of equal rows; measured ones take more room than this.
 FEW_NUMBERS, NUMBERS_A_BYTE = 20_000_000, 25
 LONGEST_HEADER = 1 << 20  # bytes of a CSV's first line
+BOM = b"\xef\xbb\xbf"
 THREADS_FROM = 1 << 20  # bytes; below, starting threads takes longer than reading
-LINE_END = re.compile(rb"[\r\n]")
+LINE_END = re.compile(rb"\r\n?|\n")
 _META = b"barberpole"
 BAD_PARQUET = (ValueError, OSError, pa.ArrowException, RecursionError)  # the last: brackets in the metadata
 
 
 def read_csv(data: bytes, where: object, readings: bool = True) -> tuple[Columns, list[str], int]:
-    """Columns of a comma-separated file with names in its first line: columns (NaN where empty), notes, rows dropped.
+    """Columns of a comma-separated file with names in its first line, but for lines that begin with #: columns (NaN
+    where empty), notes, rows dropped.
 
     readings: whether there must be columns x_lsb.. (of an array they begin with the sensor's name).
     Raises InputError about the names, or about a cell of a known column that is no number, with its row.
     """
-    names = header_of(data, where)
+    names, above = header_of(data, where)
     check_names(names, where, readings)
     dropped: list[Any] = []
     parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(row.number) or "skip")
     convert = pa_csv.ConvertOptions(null_values=NULLS, strings_can_be_null=True, true_values=[], false_values=[])
-    read = pa_csv.ReadOptions(skip_rows=1, column_names=names, use_threads=len(data) > THREADS_FROM)
+    read = pa_csv.ReadOptions(skip_rows=above, column_names=names, use_threads=len(data) > THREADS_FROM)
     try:
         table = pa_csv.read_csv(io.BytesIO(_as_utf8(data)), read, parse, convert)
     except pa.ArrowInvalid as error:
@@ -95,12 +98,36 @@ def meta_of(schema: pa.Schema) -> dict[str, Any]:
     return json.loads((schema.metadata or {}).get(_META, b"{}"))
 
 
-def header_of(data: bytes, where: object) -> list[str]:
-    """The column names in the first line of a CSV. Raises InputError where it holds none."""
-    first = LINE_END.split(data[: LONGEST_HEADER + 1], maxsplit=1)[0]
-    if len(first) > LONGEST_HEADER:
+def header_of(data: bytes, where: object) -> tuple[list[str], int]:
+    """The column names of a CSV, in its first line or below remarks that begin with #, and how many lines the rows
+    stand below. Raises InputError where there are none."""
+    lines = []
+    for line in _lines(data[: LONGEST_HEADER + 1]):
+        lines.append(line)
+        if not line.removeprefix(BOM).startswith(b"#"):
+            break
+    at = len(lines) - 1
+    if at and (not lines[at].strip() or _begins_rows(lines[at])):
+        at -= 1  # numpy.savetxt writes its names so
+    if sum(map(len, lines[: at + 1])) + at > LONGEST_HEADER:
         got = "a longer one"
         raise InputError(must("the log's first line", f"of at most {LONGEST_HEADER} characters", got, where))
+    return _names(lines[at], where), at + 1
+
+
+def _lines(data: bytes) -> Iterator[bytes]:
+    start = 0
+    for end in LINE_END.finditer(data):
+        yield data[start : end.start()]
+        start = end.end()
+    yield data[start:]
+
+
+def _begins_rows(line: bytes) -> bool:
+    return all(_number(cell) is not None for cell in line.decode(errors="replace").split(","))
+
+
+def _names(first: bytes, where: object) -> list[str]:
     if not first.strip():
         raise InputError(must("the log", "a line of column names and rows under it", "an empty first line", where))
     try:
@@ -108,7 +135,7 @@ def header_of(data: bytes, where: object) -> list[str]:
     except UnicodeDecodeError:
         got = "UTF-16" if first.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "other bytes"
         raise InputError(must("the log's first line", "column names in UTF-8", got, where)) from None
-    marked = line.startswith("#")  # numpy.savetxt writes its header so
+    marked = line.startswith("#")
     try:
         names = [name.strip() for name in next(csv.reader([line.lstrip("# ")]), [])]
     except csv.Error as error:  # a name of more characters than anybody writes

@@ -135,7 +135,7 @@ def _names(path: Path) -> tuple[list[str], dict[str, Any]]:
         except BAD_PARQUET as error:
             raise InputError(must("the log", "a Parquet file", short(error), path)) from None
     with path.open("rb") as file:
-        return header_of(file.readline(LONGEST_HEADER + 1), path), {}
+        return header_of(file.read(LONGEST_HEADER + 1), path)[0], {}
 
 
 def _parquet(path: Path, names: list[str], dropped: list[int]) -> Iterator[dict[str, np.ndarray]]:
@@ -151,9 +151,9 @@ def _csv(path: Path, names: list[str], dropped: list[int]) -> Iterator[dict[str,
     types = dict.fromkeys(names, pa.float64())
     convert = pa_csv.ConvertOptions(column_types=types, include_columns=names, null_values=NULLS)
     with path.open("rb") as file:
-        listed = header_of(file.readline(LONGEST_HEADER + 1), path)
+        listed, above = header_of(file.read(LONGEST_HEADER + 1), path)
     parse = pa_csv.ParseOptions(invalid_row_handler=lambda row: dropped.append(1) or "skip")
-    read = pa_csv.ReadOptions(block_size=BLOCK, skip_rows=1, column_names=listed)
+    read = pa_csv.ReadOptions(block_size=BLOCK, skip_rows=above, column_names=listed)
     try:
         with pa_csv.open_csv(path, read, parse, convert) as reader:
             for batch in reader:

@@ -239,6 +239,17 @@ def _undo(terms, xyz, p, at):
     return xyz
 
 
+def _require_known(effect: Effect, setup: Setup) -> None:
+    """Raise InputError for a setting that the effect does not have: a slip of the pen would pass for the default."""
+    if effect.settings is None:
+        return
+    known = (*effect.settings, *(("form",) if effect.flips else ()))
+    for key in setup.settings:
+        if key not in known:
+            wanted = f"made of {effect.name}'s own ({', '.join(known) or 'it has none'})"
+            raise InputError(must("the model file's settings", wanted, f"{effect.name}.{key}"))
+
+
 def compose(names: Sequence[str], setups: dict[str, Setup] | Setup, extra: Sequence[Effect] = ()) -> Model:
     """The model of these effects, in physical order whatever the order of the names."""
     order = {effect.name: place for place, effect in enumerate(in_order(extra))}
@@ -246,6 +257,7 @@ def compose(names: Sequence[str], setups: dict[str, Setup] | Setup, extra: Seque
     terms, start = [], 0
     for effect in sorted(chosen.values(), key=lambda effect: order[effect.name]):
         setup = setups if isinstance(setups, Setup) else setups[effect.name]
+        _require_known(effect, setup)
         params = effect.params(setup)
         terms.append(Term(effect, params, slice(start, start + len(params))))
         start += len(params)

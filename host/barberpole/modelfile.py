@@ -4,7 +4,7 @@
     plugins = ["my_effect.py"]      # optional, beside the model file
     sensor = "hmc1021_1022"         # optional
     [reference]                     # optional
-    kind = "constant"
+    kind = "constant"               # "vector", "magnitude" or "constant": use no more of the field than that
     magnitude_ut = 48.9
     [cross_field]                   # optional settings of an effect
 
@@ -36,7 +36,8 @@ NAME = re.compile(r"[a-z][a-z0-9_]*")
 class ModelFile:
     """The chosen effects. `settings` by effect; `plugins` as paths that can be opened from here; `path` if it was read.
 
-    reference may hold kind ("vector", "magnitude", "constant"), magnitude_ut and temp_c.
+    reference may hold kind ("vector", "magnitude" or "scalar", "constant": what is used of the field; without it, all
+    that the log knows), magnitude_ut and temp_c.
     """
 
     effects: tuple[str, ...]
@@ -112,7 +113,8 @@ def remove_effect(model: ModelFile, name: str) -> ModelFile:
 
 @checked_dataclass(frozen=True, config=STRICT)
 class _Reference:
-    kind: Literal["vector", "magnitude", "constant"] | None = None
+    kind: Literal["vector", "magnitude", "scalar", "constant"] | None = None
+    """What is used of the known field."""
     magnitude_ut: Positive | None = None
     """µT. Magnitude of the field."""
     temp_c: Number | None = None
@@ -138,11 +140,15 @@ def _from_file(path: Path) -> ModelFile:
     for name in tables:
         if name not in KEYS:
             raise InputError(unknown(name, [*KEYS, *names], "the model file", path))
+    if isinstance(tables.get("reference"), str):  # reference = "vector" says the kind alone
+        tables["reference"] = {"kind": tables["reference"]}
     head = validate(_Head, tables, "the model file", path)
     if not head.effects:
         raise InputError(must("effects", "a list of at least one effect", "an empty list", path))
     plugins = tuple(str(path.parent / plugin) for plugin in head.plugins)
-    reference = tables.get("reference", {})
+    reference = dict(tables.get("reference", {}))
+    if reference.get("kind") == "scalar":
+        reference["kind"] = "magnitude"
     return ModelFile(_distinct(head.effects, path), settings, reference, plugins, head.sensor, path)
 
 

@@ -1,11 +1,12 @@
 """What a fit sees of a log: readings with the sign of SET, the conditions of each, and the reference field."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from barberpole.columns import CURRENT, FIELD, READINGS, RESET, SET
 from barberpole.effects.effect import Conditions
+from barberpole.errors import InputError, must
 from barberpole.log import Log, resets_are_raw
 from barberpole.polarity import states_are_raw
 from barberpole.sensor import Sensor
@@ -53,6 +54,21 @@ def observations(log: Log, sensor: Sensor | None = None, raw: bool | None = None
     notes = ("RESET readings come with reversed sign: turned",) if raw else ()
     row = np.repeat(np.arange(log.n), repeat)
     return Observations(y, at, b_ut, b_mag, row, _reference(b_ut, b_mag), raw, notes, sensor is not None)
+
+
+def as_told(seen: Observations, kind: str | None) -> Observations:
+    """The observations with as much of the field as a model file's `reference.kind` wants to be known of it.
+
+    Raises InputError where the log knows less.
+    """
+    if kind is None or kind == seen.reference:
+        return seen
+    if kind == "constant":
+        return replace(seen, b_ut=None, b_mag=None, reference=kind)
+    if kind == "magnitude" and seen.b_ut is not None:
+        return replace(seen, b_ut=None, b_mag=np.linalg.norm(seen.b_ut, axis=0), reference=kind)
+    columns = "bx_ut, by_ut, bz_ut" if kind == "vector" else "b_ut"
+    raise InputError(must("the log", f"one with {columns}, for the reference of the model file ({kind})", "none"))
 
 
 def _pairs(log: Log, known: bool | None) -> tuple[np.ndarray, np.ndarray, bool]:

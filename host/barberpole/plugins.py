@@ -110,4 +110,5 @@ def _as_written(name: str, module: ModuleType) -> Effect:
         summary=str(getattr(module, "SUMMARY", "")),
         memory=bool(getattr(module, "MEMORY", False)),
         stage=stage,
+        settings=None,
     )

@@ -16,7 +16,7 @@ from barberpole.fit.stream import Streamed
 from barberpole.fitted import Fitted, from_calibration
 from barberpole.log import Log
 from barberpole.log_stream import LogStream
-from barberpole.observations import Observations, observations
+from barberpole.observations import Observations, as_told, observations
 from barberpole.plugins import load_plugins
 from barberpole.reasons import sentence
 from barberpole.selfcal import SelfcalResult, recompute
@@ -132,7 +132,8 @@ def coils_driven(log: Log) -> bool:
 
 
 def _readings(log: Log, calibration: Calibration, fitted: Fitted, stream: LogStream | None) -> Iterator[Check]:
-    seen = _with_sensor(observations(log), fitted, log)
+    told = as_told(observations(log), calibration.model.reference.get("kind"))
+    seen = _with_sensor(told, fitted, log)
     require_columns(seen, fitted.model.effects, load_plugins(calibration.model.plugins))
     magnitude = float(calibration.model.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
     problem = Problem(fitted.model, seen, magnitude)

@@ -175,8 +175,12 @@ def twin(
     gradient: Annotated[
         tuple[float, float, float], typer.Option(help="nT/m around an array, x y z along its first baseline.")
     ] = (0.0, 0.0, 0.0),
+    as_json: bool = AS_JSON,
 ) -> None:
     """Start the emulated board; its port is the first line. Ctrl-C switches it off."""
     from barberpole.twin.command import run_twin
 
-    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen, coils, gradient)
+    def say(port: str) -> None:
+        print_json({"port": port, "board": board}) if as_json else print(port)
+
+    run_twin(board, tuple(hidden or ()), seed, flash_dir, tuple(fault or ()), romfs, frozen, coils, gradient, say)

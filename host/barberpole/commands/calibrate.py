@@ -19,7 +19,7 @@ from barberpole.diagnose import compare as compare_fit
 from barberpole.diagnose import diagnose as diagnose_log
 from barberpole.effects import Effect, alias_notes, listed_as
 from barberpole.errors import BarberpoleError, InputError, must
-from barberpole.fit.answer import fit_json
+from barberpole.fit.answer import fit_json, remarks
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.log import Log, read_log, write_log
 from barberpole.log_stream import LogStream
@@ -83,7 +83,7 @@ def fit(
         calibration = with_selfcal(calibration, run, _sensor_of(data, file, sensor) or load_sensor("hmc1021_1022"))
     if output:
         write_calibration(calibration, output)
-    notes(alias_notes(file.effects))
+    notes((*alias_notes(file.effects), *remarks(found)))
     if as_json:
         beside = {"prior": asdict(stated)} if stated else {}
         print_json(fit_json(found, data.skipped) | published.to_json(answer, method) | beside)
@@ -199,7 +199,10 @@ def add(
     sensor: SensorOption = None,
     as_json: bool = AS_JSON,
 ) -> None:
-    """Put an effect into the model file, refit, and show the error before and after."""
+    """Put an effect into the model file, refit, and show the error before and after.
+
+    It is put in, and the exit code is 0, also where it does not pay: `pays` says so, and `remove` takes it out again.
+    """
     _change(effect, model, log, output, sensor, as_json, add_effect)
 
 

@@ -14,6 +14,7 @@ from barberpole.calibration_tables import Value
 from barberpole.commands.console import AS_JSON, OUT, notes, print_json, say, table
 from barberpole.commands.reference import DateOption, MagnitudeOption, PlaceOption, magnitude_ut
 from barberpole.files import write_atomic
+from barberpole.fit.answer import remarks
 from barberpole.log import Log, read_log
 from barberpole.methods.answer import Answer, Given, Values
 from barberpole.methods.over_temperature import values_of
@@ -23,6 +24,7 @@ from barberpole.modelfile import read_model
 from barberpole.numbers import with_error
 
 FORMAT = 1
+QUALITY = ("rms_lsb", "rms_ut", "rms_norm_percent", "heldout_rms_lsb")
 
 
 def register(app: typer.Typer) -> None:
@@ -90,7 +92,7 @@ def write_and_show(answer: Answer, data: Log, method: str, output: Path | None, 
     if output:
         write_atomic(output, values_text(answer.values, data, method))
     if as_json:
-        print_json({"n": data.n, "skipped": data.skipped} | to_json(answer, method))
+        print_json(_quality_json(answer, data) | to_json(answer, method))
     else:
         notes(data.notes)
         show_values(answer)
@@ -98,12 +100,30 @@ def write_and_show(answer: Answer, data: Log, method: str, output: Path | None, 
             say(f"figures written to {output}")
 
 
+def _quality_json(answer: Answer, data: Log) -> dict:
+    """What every fit says, of a method whose answer is no set of effects; a closed form converges."""
+    found = {"n": data.n}
+    if answer.quality:
+        found |= {key: getattr(answer.quality, key) for key in QUALITY}
+    return found | {
+        "parameters": _figures(answer.parameters),
+        "converged": True,
+        "unobservable": [],
+        "skipped": data.skipped,
+    }
+
+
+def _figures(values: Values) -> dict:
+    return {name: {"value": v.value, "stderr": v.stderr, "unit": v.unit} for name, v in values.items()}
+
+
 def to_json(answer: Answer | None, method: str | None) -> dict:
     """The method's part of `fit --json`; empty without one."""
     if answer is None:
         return {}
-    values = {name: {"value": v.value, "stderr": v.stderr, "unit": v.unit} for name, v in answer.values.items()}
-    return {"method": method, "values": values, "notes": list(answer.notes)}
+    found = {"method": method, "values": _figures(answer.values)}
+    said = remarks(answer.fit) if answer.fit else ()
+    return found | {"notes": [*said, *answer.notes]}
 
 
 def show_values(answer: Answer | None) -> None:

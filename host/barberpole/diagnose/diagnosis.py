@@ -17,7 +17,7 @@ from barberpole.diagnose.stretches import in_full, part_of
 from barberpole.diagnose.visibility import unseen, visibility
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
-from barberpole.errors import InputError
+from barberpole.errors import CoverageError
 from barberpole.fit.easy_axes import with_easy_axes
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.fit.noise import Noise
@@ -27,6 +27,7 @@ from barberpole.observations import Observations, observations
 from barberpole.sensor import Sensor
 
 GEOMETRY = 30.0  # condition number of the linear part above which nothing is named (full turns: below 6)
+ROWS_EACH = 10  # residuals for each parameter below which nothing is named
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
 CLEAR = 0.1  # fall of the held-out error that no noise makes
@@ -41,7 +42,8 @@ def diagnose(
     sensor: Sensor | None = None,
     extra: Sequence[Effect] = (),
 ) -> Diagnosis:
-    """Judge a model on a log. Raises InputError where the log cannot be fitted for want of columns or rows."""
+    """Judge a model on a log. Raises InputError where the log is wrong, or lacks a column that the model needs; one
+    that is only too short or too flat is inconclusive."""
     seen = observations(log, sensor)
     rest = None if noise_log is None else observations(noise_log, sensor)
     known = log.has("state") or bool(np.any(np.asarray(seen.at.state)))
@@ -62,10 +64,10 @@ def diagnose_observations(
     seen = with_easy_axes(seen)
     try:
         fit = fit_observations(_about_its_temperature(seen), file, extra)
-    except InputError as error:
+    except CoverageError as error:
         return inconclusive(seen, str(error))
     absent = absent_effects(fit, extra, file.settings, state_known)
-    lack = _geometry(fit)
+    lack = _geometry(fit) or _too_few(fit)
     if lack:
         return inconclusive(seen, lack, fit, absent)
     part, how = part_of(fit), (fit, absent, rest, extra)
@@ -114,6 +116,16 @@ def _geometry(fit: Fit) -> str:
             f"apart in this log (condition number {condition:.0f}, at most {GEOMETRY:.0f} wanted)"
         )
     return ""
+
+
+def _too_few(fit: Fit) -> str:
+    """How many rows are missing for the residual to say anything, or ''."""
+    rows, wanted = np.unique(fit.problem.seen.row).size, ROWS_EACH * int(fit.free.sum())
+    readings = fit.problem.n * fit.problem.residuals_per_sample
+    if readings >= wanted:
+        return ""
+    least = -(-wanted * rows // readings)
+    return f"record at least {least} rows: {rows} say too little of {int(fit.free.sum())} parameters and their noise"
 
 
 def _conclude(

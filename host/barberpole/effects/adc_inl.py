@@ -118,4 +118,5 @@ ADC_INL = Effect(
     off_board="it acts on single codes, of which the board undoes the mean",
     shapes=shapes,
     search=search,
+    settings=("form", "harmonics", "period_lsb"),
 )

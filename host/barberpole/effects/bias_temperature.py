@@ -67,4 +67,5 @@ BIAS_TEMPERATURE = Effect(
     requires=("temp_c",),
     summary="the offset of each axis moves with temperature",
     shapes=lambda setup: polynomial.orders(1, 2),
+    settings=("order",),
 )

@@ -93,4 +93,5 @@ COIL_HEATING = Effect(
     summary="the heat of the coil currents moves offset and sensitivity",
     memory=True,
     shapes=shapes,
+    settings=("tau_s", "share"),
 )

@@ -92,4 +92,5 @@ CROSS_FIELD = Effect(
     summary="the field along a bridge's easy axis changes its sensitivity",
     joint=joint,
     shapes=shapes,
+    settings=("form",),
 )

@@ -52,4 +52,5 @@ DRIFT = Effect(
     summary="the offset of each axis moves with time",
     off_board="the board's clock starts anew at each power-up",
     shapes=lambda setup: polynomial.orders(1, 2),
+    settings=("order",),
 )

@@ -163,6 +163,7 @@ class Effect:
     shapes      Setup -> forms it may take. None: one form, all parameters, derivative at the null
     search      (Setup, Conditions, reading (3, n), residual (3, n)) -> forms proposed by what is left of the readings
     notes       sentences on what using it costs
+    settings    keys that the model file may give it; None: any (a user's effect reads what it likes)
     """
 
     name: str
@@ -185,6 +186,7 @@ class Effect:
     shapes: Callable[[Setup], tuple[Shape, ...]] | None = None
     search: Callable[[Setup, Conditions, Array, Array], tuple[Shape, ...]] | None = None
     notes: tuple[str, ...] = ()
+    settings: tuple[str, ...] | None = ()
 
     @property
     def compilable(self) -> bool:

@@ -118,4 +118,5 @@ HYSTERESIS = Effect(
     tangent=tangent,
     off_board="its undo needs all readings since the last turning point",
     shapes=shapes,
+    settings=("plays", "width_ut"),
 )

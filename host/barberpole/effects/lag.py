@@ -71,4 +71,5 @@ LAG = Effect(
     tangent=tangent,
     off_board="its undo needs the reading before and the time between",
     shapes=shapes,
+    settings=("axes",),
 )

@@ -74,4 +74,5 @@ MAINS = Effect(
     off_board="the phase of the mains is not known at the next power-up",
     shapes=lambda setup: (Shape(),) if "frequency_hz" in setup.settings else (),
     search=search,
+    settings=("frequency_hz",),
 )

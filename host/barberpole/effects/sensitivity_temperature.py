@@ -47,4 +47,5 @@ SENSITIVITY_TEMPERATURE = Effect(
     requires=("temp_c",),
     summary="the sensitivity of each axis moves with temperature",
     shapes=lambda setup: polynomial.orders(1, 2),
+    settings=("order",),
 )

@@ -62,4 +62,5 @@ SOFT_IRON = Effect(
     jacobian,
     affine=True,
     summary="iron that turns with the sensor bends the field towards itself",
+    settings=("diagonal",),
 )

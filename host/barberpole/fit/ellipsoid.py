@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from barberpole.errors import InputError
+from barberpole.errors import CoverageError
 
 CHUNK = 4096  # samples at a time
 MIN_SAMPLES = 12  # nine unknowns, and something left to judge them by
@@ -30,23 +30,23 @@ class Ellipsoid:
 def algebraic(reading: np.ndarray, magnitude: float = 1.0) -> Ellipsoid:
     """Least-squares ellipsoid through readings (3, n) in LSB, scaled so that |H| = magnitude (4.19).
 
-    Raises InputError when the readings do not determine an ellipsoid, saying what is missing.
+    Raises CoverageError when the readings do not determine an ellipsoid, saying what is missing.
     """
     n = reading.shape[1]
     if n < MIN_SAMPLES:
-        raise InputError(f"an ellipsoid fit must have at least {MIN_SAMPLES} samples; got {n}")
+        raise CoverageError(f"an ellipsoid fit must have at least {MIN_SAMPLES} samples; got {n}")
     high, low = reading.max(axis=1), reading.min(axis=1)
     middle, size = 0.5 * (high + low), float(np.max(high - low)) / 2
     if size == 0:
-        raise InputError("an ellipsoid fit must have readings that move; got constant readings on all axes")
+        raise CoverageError("an ellipsoid fit must have readings that move; got constant readings on all axes")
     gram, total = _normal_equations(reading, middle, size)
     try:
         q = np.linalg.solve(gram, total)
     except np.linalg.LinAlgError:
-        raise InputError(coverage_message(reading)) from None
+        raise CoverageError(coverage_message(reading)) from None
     d = np.array([[q[0], q[3], q[4]], [q[3], q[1], q[5]], [q[4], q[5], q[2]]])
     if np.linalg.eigvalsh(d)[0] <= 0:
-        raise InputError(coverage_message(reading))
+        raise CoverageError(coverage_message(reading))
     b = -np.linalg.solve(d, q[6:])
     upper = np.linalg.cholesky(d / (1.0 + b @ d @ b)).T  # (h-b)^T D (h-b) = 1 + b^T D b
     return Ellipsoid(magnitude * upper / size, middle + size * b)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from barberpole.effects import Effect, Setup, find_effect
-from barberpole.errors import InputError, must
+from barberpole.errors import CoverageError, InputError, must
 from barberpole.fit import observability
 from barberpole.fit.affine import moments
 from barberpole.fit.easy_axes import with_easy_axes
@@ -22,7 +22,7 @@ from barberpole.fit.whole import Figures, figures
 from barberpole.log import Log
 from barberpole.model import Model, compose
 from barberpole.modelfile import ModelFile
-from barberpole.observations import Observations, observations
+from barberpole.observations import Observations, as_told, observations
 
 OUTLIER = 4.0  # robust standard deviations; one normal reading in 16 000 lies beyond
 MAD = 1.4826  # standard deviation over median absolute deviation of a normal distribution
@@ -131,7 +131,15 @@ def fit_observations(seen: Observations, file: ModelFile, extra: Sequence[Effect
     known = {find_effect(n, extra).name: replace(setup, settings=file.settings.get(n, {})) for n in file.effects}
     model = compose(file.effects, known, extra)
     problem = Problem(model, seen, magnitude, moments=taken)
-    return fit_problem(problem, linear, known, tuple(extra), start_values(model, linear), tick)
+    return require_any(fit_problem(problem, linear, known, tuple(extra), start_values(model, linear), tick))
+
+
+def require_any(fit: Fit) -> Fit:
+    """The fit. Raises CoverageError where the log determines nothing of the model."""
+    if fit.free.any() or not fit.model.names:
+        return fit
+    wanted = "one that determines a parameter (turn the sensor through all directions)"
+    raise CoverageError(must("the log", wanted, f"none of {', '.join(fit.model.names)}"))
 
 
 def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float], hold: frozenset[str] = frozenset()) -> Fit:
@@ -147,7 +155,9 @@ def refit(fit: Fit, known: dict[str, Setup], start: dict[str, float], hold: froz
 
 
 def with_reference(seen: Observations, file: ModelFile) -> Observations:
-    """Observations with the model file's reference temperature; time counts from the start of the log."""
+    """Observations with the model file's reference: of the field and of temperature; time counts from the start of
+    the log. Raises InputError where the log knows less of the field."""
+    seen = as_told(seen, file.reference.get("kind"))
     start = 0.0 if seen.at.t_s is None else float(seen.at.t_s[0])
     at = replace(seen.at, t0_c=float(file.reference.get("temp_c", seen.at.t0_c)), t0_s=start)
     return replace(seen, at=at)
@@ -213,7 +223,8 @@ def fit_problem(
     Raises InputError where there are too few readings, or, against a magnitude, where they lie in a plane.
     """
     if problem.n * problem.residuals_per_sample <= len(p):
-        raise InputError(f"log must have more readings than the model has parameters ({len(p)}); got {problem.n} rows")
+        wanted = f"longer than the model has parameters ({len(p)})"
+        raise CoverageError(must("the log", wanted, f"{problem.n * problem.residuals_per_sample} readings"))
     if problem.model.loss is None:
         problem = replace(problem, believed=None)
     elif problem.believed is None:
@@ -227,7 +238,7 @@ def fit_problem(
         problem = replace(problem, believed=believed)
         solution = determined(problem, solution.p, solution.free, tick)
     if not problem.vector and problem.thinnest < THIN * solution.gram.rms():
-        raise InputError(no_surface(problem.seen.y))
+        raise CoverageError(no_surface(problem.seen.y))
     s = solution
     return Fit(problem, s.p, s.covariance, s.gram, s.free, s.converged, linear, known, extra, held)
 

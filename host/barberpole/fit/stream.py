@@ -18,7 +18,7 @@ from barberpole.log import Log
 from barberpole.log_stream import LogStream
 from barberpole.model import Model
 from barberpole.modelfile import ModelFile
-from barberpole.observations import Observations, observations
+from barberpole.observations import Observations, as_told, observations
 from barberpole.sensor import Sensor
 
 IN_MEMORY = 10_000_000  # rows: what a model with memory may take
@@ -69,6 +69,7 @@ class Streamed:
         seen = self.like.seen
         for columns in self.stream.pieces():
             piece = observations(Log(columns, self.stream.path, ""), self.sensor, seen.raw_polarity)
+            piece = as_told(piece, seen.reference)
             at = replace(piece.at, t0_c=seen.at.t0_c, t0_s=seen.at.t0_s, gain=seen.at.gain, easy_axis=seen.at.easy_axis)
             at = replace(at, raw_polarity=seen.at.raw_polarity)
             yield replace(self.like, seen=replace(piece, at=at), moments=None)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from barberpole.errors import InputError, must
+from barberpole.errors import CoverageError, InputError, must
 from barberpole.fit.affine import Moments
 from barberpole.fit.few import few
 from barberpole.fit.spikes import no_surface
@@ -123,7 +123,7 @@ def _require_a_shell(seen: Observations, linear: Linear, ratio: np.ndarray) -> N
     """
     gain = np.linalg.norm(linear.matrix, axis=1)
     if MAD * float(np.median(np.abs(ratio - 1.0))) > FILLED or gain.max() > GAIN_RATIO * gain.min():
-        raise InputError(no_surface(seen.y))
+        raise CoverageError(no_surface(seen.y))
 
 
 def require_one_field(ratio: np.ndarray, causes: list[np.ndarray], row: np.ndarray) -> None:

@@ -9,10 +9,12 @@ from barberpole.calibration import Calibration
 from barberpole.calibration_tables import Value
 from barberpole.fit.fit import Fit
 from barberpole.log import Log
+from barberpole.methods.quality import Quality
 from barberpole.modelfile import ModelFile
 from barberpole.sensor import Sensor
 
 Values = dict[str, Value]
+JUDGING = ("rms.", "residual.", "peak_to_peak.")  # figures on the answer, which nobody would compensate with
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,19 @@ class Given:
 class Answer:
     """The method's own figures, each with standard error and unit; and the fit, where effects can say the same.
 
-    notes: what the figures rest on, in sentences.
+    notes: what the figures rest on, in sentences. quality: how well it does, where there is no fit to say so.
     """
 
     values: Values
     fit: Fit | None = None
     file: ModelFile | None = None
     notes: tuple[str, ...] = ()
+    quality: Quality | None = None
+
+    @property
+    def parameters(self) -> Values:
+        """The figures that make up the calibration."""
+        return {name: v for name, v in self.values.items() if not name.startswith(JUDGING)}
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ import numpy as np
 
 from barberpole.errors import InputError, must
 from barberpole.fit.ellipsoid import Ellipsoid, algebraic
+from barberpole.methods.quality import FOLDS, stretches
 from barberpole.units import gauss_to_ut
 
 ANISOTROPY_UT = tuple(gauss_to_ut(h) for h in (9.0, 8.5, 10.0))  # eq. 5.13, Oe
@@ -25,6 +26,7 @@ INTERVAL_S = 1.0  # of a peak-to-peak value (5.3.3)
 INTERVAL_ROWS = 50  # where the log has no time
 WIDEST = 2.0  # first grid: -2 to 2
 COARSE, FINE, ROUNDS = 9, 3, 7  # points an axis of the first grid and of the finer ones, each half the size
+NEAR, ROUNDS_NEAR = 0.125, 4  # of the first pitch, and grids, where a triple is known already
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,28 @@ class Search:
     rms_before_ut: float
     rms_after_ut: float
     shape: Ellipsoid
+    ground: "Ground"
+
+    def norm(self, reading: np.ndarray) -> np.ndarray:
+        """|H| (n,) in µT of compensated readings (3, n) in LSB."""
+        return _norm(self.shape, self.ground.corrected(reading, self.factors, self.flipped))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The first ellipsoid, its gains (3, 1) in LSB/µT, H_k (3, 1) in µT and easy axes: what a triple is applied to."""
+
+    shape: Ellipsoid
+    gain: np.ndarray
+    anisotropy_ut: np.ndarray
+    easy_axis: tuple[int, int, int]
+
+    def corrected(self, reading: np.ndarray, factors: np.ndarray, is_flipped: bool) -> np.ndarray:
+        """Readings (3, n) in LSB without their cross-field."""
+        own = (reading - self.shape.centre[:, None]) / self.gain
+        law = flipped if is_flipped else unflipped
+        field = law(own, own, factors[:, None] * own[list(self.easy_axis)], self.anisotropy_ut)
+        return self.shape.centre[:, None] + self.gain * field
 
 
 def unflipped(v: np.ndarray, own: np.ndarray, easy: np.ndarray, anisotropy: np.ndarray | float) -> np.ndarray:
@@ -72,12 +96,17 @@ def search(
     easy_axis: tuple[int, int, int],
     first: np.ndarray,
     is_flipped: bool,
+    near: np.ndarray | None = None,
 ) -> Search:
-    """The grid search on readings (3, n) in LSB. Raises InputError where the readings do not surround the sensor."""
+    """The grid search on readings (3, n) in LSB. Raises InputError where the readings do not surround the sensor.
+
+    near: a triple to search around, with the finer grids alone.
+    """
     shape = algebraic(reading, magnitude)
     gain = np.linalg.norm(np.linalg.inv(shape.upper), axis=1)[:, None]
+    ground = Ground(shape, gain, np.asarray(anisotropy_ut, float)[:, None], easy_axis)
     own = (reading - shape.centre[:, None]) / gain
-    easy, hk = own[list(easy_axis)], np.asarray(anisotropy_ut, float)[:, None]
+    easy, hk = own[list(easy_axis)], ground.anisotropy_ut
     law = flipped if is_flipped else unflipped
 
     def cost(factors: np.ndarray) -> float:
@@ -87,7 +116,7 @@ def search(
         except InputError:
             return np.inf
 
-    best = _descend(cost, is_flipped)
+    best = _descend(cost, is_flipped, near)
     field = law(own, own, best[:, None] * easy, hk)
     final = algebraic(field, magnitude)
     before, after = _norm(shape, reading), _norm(final, field)
@@ -99,16 +128,34 @@ def search(
         _rms(before - magnitude),
         _rms(after - magnitude),
         Ellipsoid(final.upper / gain[:, 0], shape.centre + gain[:, 0] * final.centre),
+        ground,
     )
 
 
-def _descend(cost, is_flipped: bool) -> np.ndarray:
+def heldout(reading: np.ndarray, magnitude: float, first: np.ndarray, found: Search) -> np.ndarray:
+    """(n,) µT: |H| - K of each reading (3, n) by a search, around the triple found, over the intervals without it."""
+    interval = np.searchsorted(first, np.arange(reading.shape[1]), side="right") - 1
+    fold, left = stretches(first.size)[interval], np.empty(reading.shape[1])
+    ground = found.ground
+    for out in (fold == k for k in range(FOLDS) if np.any(fold == k)):
+        starts = np.unique(interval[~out], return_index=True)[1]
+        hk, easy = ground.anisotropy_ut[:, 0], ground.easy_axis
+        by = search(reading[:, ~out], magnitude, hk, easy, starts, found.flipped, found.factors)
+        left[out] = by.norm(reading[:, out]) - magnitude
+    return left
+
+
+def _descend(cost, is_flipped: bool, near: np.ndarray | None) -> np.ndarray:
     """The best triple: a wide grid, then grids of half the pitch around the best so far. (5.15) is even in a."""
     low = 0.0 if is_flipped else -WIDEST
     axis = np.linspace(low, WIDEST, COARSE)
-    best, least = _best(cost, product(axis, repeat=3), np.zeros(3), np.inf)
-    pitch = axis[1] - axis[0]
-    for _ in range(ROUNDS):
+    pitch, rounds = axis[1] - axis[0], ROUNDS
+    if near is None:
+        best, least = _best(cost, product(axis, repeat=3), np.zeros(3), np.inf)
+    else:
+        best, least = near, cost(near)
+        pitch, rounds = NEAR * pitch, ROUNDS_NEAR
+    for _ in range(rounds):
         pitch *= 0.5
         around = (np.linspace(b - pitch, b + pitch, FINE) for b in best)
         best, least = _best(cost, product(*around), best, least)

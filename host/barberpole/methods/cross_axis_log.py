@@ -6,7 +6,8 @@ from barberpole.errors import InputError, must
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
-from barberpole.methods.cross_axis import ANISOTROPY_UT, WIDEST, Search, intervals, require_anisotropy, search
+from barberpole.methods.cross_axis import ANISOTROPY_UT, WIDEST, Search, heldout, intervals, require_anisotropy, search
+from barberpole.methods.quality import of_the_norm
 from barberpole.methods.readings import one_magnitude, scalar
 from barberpole.methods.scalar import require_seen
 from barberpole.observations import Observations
@@ -33,7 +34,8 @@ def cross_axis_search(log: Log, given: Given) -> Answer:
     y, first = _chosen(seen, log.path)
     tried = [search(y, known, hk, easy, first, form) for form in _forms(log)]
     best = min(tried, key=lambda found: found.sum_after_ut)
-    return Answer(_values(best, hk), notes=_notes(best, len(tried)))
+    quality = of_the_norm(best.norm(y) - known, heldout(y, known, first, best), best.shape.upper, known)
+    return Answer(_values(best, hk), notes=_notes(best, len(tried)), quality=quality)
 
 
 def _chosen(seen: Observations, where: object) -> tuple[np.ndarray, np.ndarray]:

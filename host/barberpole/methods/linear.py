@@ -18,6 +18,7 @@ from barberpole.errors import InputError, must
 from barberpole.fit.start import Linear
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
+from barberpole.methods.quality import FOLDS, stretches
 from barberpole.methods.readings import LINEAR_EFFECTS, judged, vector
 from barberpole.modelfile import ModelFile
 
@@ -65,6 +66,15 @@ def linear_model(reading: np.ndarray, field_ut: np.ndarray) -> LinearModel:
     unit = np.linalg.inv(gram) / np.outer(scale, scale)
     offset = -np.linalg.solve(solved[:, :3], solved[:, 3])
     return LinearModel(solved[:, :3], offset, np.kron(np.diag(variance), unit))
+
+
+def heldout(reading: np.ndarray, field_ut: np.ndarray) -> np.ndarray:
+    """(3, n) µT: the error of each row by the model of the stretches without it."""
+    fold, left = stretches(reading.shape[1]), np.empty(field_ut.shape)
+    for k in range(FOLDS):
+        out = fold == k
+        left[:, out] = linear_model(reading[:, ~out], field_ut[:, ~out]).field(reading[:, out]) - field_ut[:, out]
+    return left
 
 
 def decompose(matrix: np.ndarray) -> Parts:

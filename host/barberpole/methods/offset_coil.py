@@ -20,7 +20,8 @@ from barberpole.fit.usable import require_microtesla
 from barberpole.fitted import from_calibration
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, matrix_values, per_axis, value
-from barberpole.methods.linear import linear_model, require_followed
+from barberpole.methods.linear import heldout, linear_model, require_followed
+from barberpole.methods.quality import against_field
 from barberpole.methods.readings import demodulated, require_regular
 from barberpole.observations import Observations
 
@@ -69,9 +70,11 @@ def offset_coil(log: Log, given: Given) -> Answer:
     values = matrix_values("A", coil.a, _stderr(found.covariance)[:, :3], "uT/LSB")
     values |= per_axis("B", coil.b, _stderr(found.covariance)[:, 3], "uT")
     values["coil"] = value(ut_per_ma, np.nan, "uT/mA")
+    quality = against_field(found.field(seen.y) - coil_ut, heldout(seen.y, coil_ut), found.matrix)
     if given.against is None:
-        return Answer(values, notes=("give --against a classical calibration for S_c sigma_c and B_c (eq. 6.7)",))
-    return Answer(values | _carried(transfer(coil, affine_of(given.against))))
+        notes = ("give --against a classical calibration for S_c sigma_c and B_c (eq. 6.7)",)
+        return Answer(values, notes=notes, quality=quality)
+    return Answer(values | _carried(transfer(coil, affine_of(given.against))), quality=quality)
 
 
 def require_driven(seen: Observations, where: object) -> np.ndarray:

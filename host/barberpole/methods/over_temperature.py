@@ -36,8 +36,13 @@ class OverTemperature:
 
     def at(self, temp_c: float) -> tuple[np.ndarray, np.ndarray]:
         """A (3, 3) and B (3,) at a temperature, by eq. 4.5."""
+        a, b = self.each(np.array([temp_c]))
+        return a[:, :, 0], b[:, 0]
+
+    def each(self, temp_c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A (3, 3, n) and B (3, n) at temperatures (n,)."""
         u = temp_c - self.t0_c
-        a = np.zeros((3, 3))
+        a = np.zeros((3, 3, u.size))
         for (i, j), p in zip(ELEMENTS, self.scale, strict=True):
             a[i, j] = np.polynomial.polynomial.polyval(u, p)
         return a, np.asarray(np.polynomial.polynomial.polyval(u, self.bias.T))

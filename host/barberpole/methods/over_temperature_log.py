@@ -14,7 +14,8 @@ from barberpole.methods.ellipsoid import efficient
 from barberpole.methods.guards import LEAST_ROWS, require_rows
 from barberpole.methods.linear import linear_model
 from barberpole.methods.over_temperature import DEGREE_A, OverTemperature, over_temperature, values_of
-from barberpole.methods.readings import one_magnitude, scalar, vector
+from barberpole.methods.quality import Quality, of_the_norm
+from barberpole.methods.readings import demodulated, one_magnitude, scalar, vector
 from barberpole.methods.scalar import require_seen
 
 WHAT = "a calibration over temperature"
@@ -48,9 +49,38 @@ def temperature(log: Log, given: Given) -> Answer:
     order = np.argsort(temp, kind="stable")
     edges = np.linspace(0, log.n, PIECES + 1).astype(int)
     parts = [log.take(np.sort(order[a:b])) for a, b in pairwise(edges)]
-    found = over_temperature(np.array([np.mean(part["temp_c"]) for part in parts]), [_shape(p, given) for p in parts])
+    temps, shapes = np.array([np.mean(part["temp_c"]) for part in parts]), [_shape(p, given) for p in parts]
+    found = over_temperature(temps, shapes)
     note = f"{PIECES} pieces by temperature; quadratic in B, cubic in A (degree {DEGREE_A})"
-    return Answer(values_of(found), notes=(note,))
+    return Answer(values_of(found), notes=(note,), quality=_quality(found, parts, shapes, given))
+
+
+def _quality(found: OverTemperature, parts: list[Log], shapes: list[Ellipsoid], given: Given) -> Quality:
+    """|H| against its magnitude; held out: each piece by polynomials through the calibrations of the others."""
+    left, heldout = [], []
+    for k, part in enumerate(parts):
+        others = [s for i, s in enumerate(shapes) if i != k]
+        without = over_temperature(np.delete(found.temp_c, k), others)
+        left.append(_off(found, part, given))
+        heldout.append(_off(without, part, given))
+    upper = found.at(found.t0_c)[0]
+    known = float(np.mean([_magnitude(part, given).mean() for part in parts]))
+    return of_the_norm(np.concatenate(left), np.concatenate(heldout), upper, known)
+
+
+def _off(found: OverTemperature, part: Log, given: Given) -> np.ndarray:
+    """|H| - |B| (n,) in µT by eq. 4.5 at each row's temperature."""
+    a, b = found.each(part["temp_c"])
+    y = demodulated(part, WHAT).y
+    return np.linalg.norm(np.einsum("ijn,jn->in", a, y) + b, axis=0) - _magnitude(part, given)
+
+
+def _magnitude(part: Log, given: Given) -> np.ndarray:
+    seen = demodulated(part, WHAT)
+    if seen.b_ut is not None:
+        return np.linalg.norm(seen.b_ut, axis=0)
+    otherwise_ut = float(given.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
+    return np.full(part.n, one_magnitude(seen, otherwise_ut, WHAT, part.path))
 
 
 def _temperature(log: Log) -> np.ndarray:

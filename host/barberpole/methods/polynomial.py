@@ -16,12 +16,11 @@ from barberpole.errors import InputError, must
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, per_axis, value
 from barberpole.methods.linear import decompose, linear_model, require_followed
+from barberpole.methods.quality import FOLDS, RUNS, against_field, rms
 from barberpole.methods.readings import vector
 
 WHAT = "the polynomial method"
 MOST = 5  # highest degree that is tried
-FOLDS = 5
-RUNS = 50  # pieces of a log whose field never stands still, so that a fold is a stretch and not every fifth row
 SIMPLER = 1.01  # held-out error, relative to the smallest, that lower degrees may have
 NULL_UT = 1e-3  # magnitude of an applied field that counts as null
 
@@ -78,12 +77,17 @@ def _row(p: np.ndarray, target: np.ndarray, row: int, on: np.ndarray, cross: np.
 
 def heldout_ut(reading: np.ndarray, field_ut: np.ndarray, degrees: tuple[int, int]) -> float:
     """RMS error in µT over stretches that the model was fitted without: every fifth held field, or piece of the log."""
-    fold, left = _folds(field_ut), 0.0
+    return rms(_heldout(reading, field_ut, degrees))
+
+
+def _heldout(reading: np.ndarray, field_ut: np.ndarray, degrees: tuple[int, int]) -> np.ndarray:
+    """(3, n) µT: the error of each row by a model fitted without its stretch."""
+    fold, left = _folds(field_ut), np.empty(field_ut.shape)
     for k in range(FOLDS):
         kept = fold != k
         found = polynomial_model(reading[:, kept], field_ut[:, kept], degrees)
-        left += float(np.sum((found.field(reading[:, ~kept]) - field_ut[:, ~kept]) ** 2))
-    return float(np.sqrt(left / field_ut.size))
+        left[:, ~kept] = found.field(reading[:, ~kept]) - field_ut[:, ~kept]
+    return left
 
 
 def _folds(field_ut: np.ndarray) -> np.ndarray:
@@ -110,15 +114,16 @@ def polynomial(log: Log, given: Given) -> Answer:
     require_followed(line, seen.y, field_ut, "the applied field", log.path)
     degrees, errors = choose(seen.y, field_ut)
     found = polynomial_model(seen.y, field_ut, degrees)
-    before, after = (np.sqrt(np.mean((f.field(seen.y) - field_ut) ** 2)) for f in (line, found))
+    before, after = rms(line.field(seen.y) - field_ut), found.field(seen.y) - field_ut
     note = f"m = {degrees[0]}, n = {degrees[1]} by held-out error"
     values = _values(found) | {
         "rms.linear": value(1000.0 * before, np.nan, "nT"),
-        "rms.polynomial": value(1000.0 * after, np.nan, "nT"),
+        "rms.polynomial": value(1000.0 * rms(after), np.nan, "nT"),
         "rms.heldout_linear": value(1000.0 * errors[1, 1], np.nan, "nT"),
         "rms.heldout_polynomial": value(1000.0 * errors[degrees], np.nan, "nT"),
     }
-    return Answer(values, notes=(note,))
+    quality = against_field(after, _heldout(seen.y, field_ut, degrees), line.matrix)
+    return Answer(values, notes=(note,), quality=quality)
 
 
 def _values(found: Polynomial) -> Values:

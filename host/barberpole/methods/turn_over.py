@@ -14,6 +14,7 @@ from barberpole.errors import InputError, must
 from barberpole.log import Log
 from barberpole.methods.answer import Answer, Given, Values, per_axis
 from barberpole.methods.guards import require_moving
+from barberpole.methods.quality import Quality, rms
 from barberpole.methods.readings import demodulated
 
 WHAT = "the turn-over method"
@@ -74,7 +75,38 @@ def turn_over_log(log: Log, given: Given) -> Answer:
         raise InputError(must(WHAT, wanted, "a log without it", log.path))
     reading = demodulated(log, WHAT).y
     require_moving(reading, WHAT, log.path, every=True)
-    return Answer(_values(turn_over(reading, log[COLUMN])))
+    found = turn_over(reading, log[COLUMN])
+    return Answer(_values(found), quality=_quality(reading, log[COLUMN], found))
+
+
+def _quality(reading: np.ndarray, turn: np.ndarray, found: TurnOver) -> Quality:
+    """What offset and residual field leave of the readings; held out: every other row of a position by the others."""
+    place = np.empty(turn.size, int)
+    for k in np.unique(turn):
+        place[turn == k] = np.arange(np.sum(turn == k))
+    left = np.empty(reading.shape)
+    for half in (0, 1):
+        out = place % 2 == half
+        kept = reading[:, ~out], turn[~out]
+        left[:, out] = _left(reading[:, out], turn[out], _offsets(*kept))
+    return Quality(rms(_left(reading, turn, (found.offset, found.residual))), rms(left))
+
+
+def _offsets(reading: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Offset and residual field (3,) without their errors; NaN where a part of the rows lacks a position."""
+    sides = [(turn == 0) | (turn == axis + 1) for axis in range(3)]
+    if any(np.all(side) or not np.any(side) for side in sides):
+        return np.full(3, np.nan), np.full(3, np.nan)
+    normal, turned = (
+        [v[at].mean() for v, at in zip(reading, ways, strict=True)] for ways in (sides, [~s for s in sides])
+    )
+    return 0.5 * (np.array(normal) + turned), 0.5 * (np.array(normal) - turned)
+
+
+def _left(reading: np.ndarray, turn: np.ndarray, by: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """(3, n): readings less the offset and the residual field as it lies."""
+    sign = np.array([np.where((turn == 0) | (turn == axis + 1), 1.0, -1.0) for axis in range(3)])
+    return reading - by[0][:, None] - sign * by[1][:, None]
 
 
 def _values(found: TurnOver) -> Values:

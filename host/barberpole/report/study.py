@@ -12,6 +12,7 @@ import numpy as np
 from barberpole.calibrating import calibration_of
 from barberpole.calibration import Calibration, Value
 from barberpole.diagnose import Comparison, Diagnosis, compare, diagnose
+from barberpole.diagnose.answer import inconclusive
 from barberpole.diagnose.resting import noise_of
 from barberpole.effects import Effect, find_effect
 from barberpole.errors import InputError
@@ -96,7 +97,7 @@ def study(log: Log, given: Given) -> Study:
     if coils_driven(log) and not log.has("t_s"):
         return done  # the points of the coil run alone: the coils' field is not one to fit to
     given = replace(given, file=_at_reference(given))
-    found = diagnose(log, given.file, given.rest, given.sensor, given.extra)
+    found = _diagnosed(log, given)
     done = replace(done, given=given, diagnosis=found)
     if not found.fits:
         return done
@@ -106,6 +107,14 @@ def study(log: Log, given: Given) -> Study:
     path = _path(seen, given, found, fit)
     values = calibration_of(fit, log, given.file).parameters
     return replace(done, fit=fit, comparison=compare(fit, noise, given.extra), path=path, values=values)
+
+
+def _diagnosed(log: Log, given: Given) -> Diagnosis:
+    """The diagnosis; of a log that nothing can be fitted to, why, so that the page can say it."""
+    try:
+        return diagnose(log, given.file, given.rest, given.sensor, given.extra)
+    except InputError as error:
+        return inconclusive(observations(log, given.sensor), str(error))
 
 
 def _at_reference(given: Given) -> ModelFile:

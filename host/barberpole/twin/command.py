@@ -2,9 +2,10 @@
 
 import contextlib
 import signal
+import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import FrameType
 
@@ -34,8 +35,9 @@ def run_twin(
     frozen: str | Path | None = None,
     coils: str | Path | None = None,
     gradient_nt_per_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    say: Callable[[str], None] = print,
 ) -> None:
-    """Start the board, print its port as the first line, and keep it until Ctrl-C or SIGTERM.
+    """Start the board, `say` its port, and keep it until Ctrl-C or SIGTERM.
 
     hidden: effects of world.HIDDEN ("none": an ideal sensor; empty: its cross-field effect). flash_dir: where the
     flash image is kept; None: nowhere, the board starts empty. romfs_kib, frozen: as of Twin.
@@ -57,7 +59,8 @@ def run_twin(
         signal.signal(signal.SIGTERM, _stop)
         with contextlib.suppress(KeyboardInterrupt):
             twin = stack.enter_context(Twin(board, folder, world, seed, faults, None, romfs_kib, frozen))
-            print(twin.port, flush=True)
+            say(twin.port)
+            sys.stdout.flush()
             while True:
                 time.sleep(ALIVE_S)
                 twin.virtual_time_s()  # raises when the board is gone
