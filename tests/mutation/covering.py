@@ -18,7 +18,7 @@ SETTINGS = """\
 source_pkgs =
     barberpole
     barberpole_codegen
-patch = subprocess, _exit
+patch = subprocess
 concurrency = thread, multiprocessing
 parallel = true
 sigterm = true
