@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from barberpole.diagnose import tails
 from barberpole.diagnose.evidence import bic_gain
+from barberpole.diagnose.patterns import jump_patterns
 from barberpole.diagnose.resting import _medians, interval
 from barberpole.diagnose.still import level, still
 from barberpole.diagnose.table import ALIKE, Design, heldout, multiply, parts_of, project, tabulate
@@ -195,6 +196,21 @@ def test_outliers_giants_and_jumps_are_told_from_noise():
     steps[2] += 0.8 * (np.arange(n) // 500 % 2)
     assert (tails.jumps(steps) > tails.LIKELIER).tolist() == [False, False, True]
     assert not tails.jumps(steps[:, :300]).any()
+
+
+def test_a_jump_is_said_with_its_chance():
+    rng, n = np.random.default_rng(9), 1800
+    residual = rng.normal(size=(3, n))
+    residual[1] += 4.0 * (np.arange(n) // 300 % 2)
+    evidence = SimpleNamespace(
+        ground=SimpleNamespace(residual=residual, axes=("x", "y", "z"), normal=None),
+        fit=SimpleNamespace(problem=SimpleNamespace(seen=SimpleNamespace(y=residual))),
+    )
+    (found,) = jump_patterns(evidence)
+    gain = tails.jumps(residual)[1]
+    assert tails.LIKELIER < gain < 600.0
+    assert (found.axis, found.against, found.p_value) == ("y", "t_s", pytest.approx(np.exp(-gain), rel=1e-9))
+    assert found.rms_lsb == pytest.approx(np.sqrt(np.mean(residual[1] ** 2)))
 
 
 def test_levels_of_a_converter_are_spread_by_one_step():

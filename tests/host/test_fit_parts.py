@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from barberpole.challenge.record import Recipe, record
-from barberpole.effects import Conditions
+from barberpole.effects import Conditions, Setup
+from barberpole.fit.affine import moments
 from barberpole.fit.easy_axes import _errors_of
 from barberpole.fit.few import ENOUGH, few
 from barberpole.fit.fit import fit_observations, setup_of
@@ -13,8 +14,9 @@ from barberpole.fit.gram import accumulate
 from barberpole.fit.honest import _by_stretches, _kept, _left_open, _reddened
 from barberpole.fit.residual import CHUNK, Problem
 from barberpole.fit.solve import _held_by_bound
+from barberpole.model import compose
 from barberpole.modelfile import ModelFile
-from barberpole.observations import observations
+from barberpole.observations import Observations, observations
 from scipy.stats import chi2, t
 from truth.trials import log_of
 
@@ -113,6 +115,44 @@ def test_every_sample_is_told_once_a_pass():
     problem = Problem(fit.model, fit.problem.seen)
     accumulate(problem, fit.p, tick=told.append)
     assert told == [CHUNK, problem.n - CHUNK]
+
+
+@pytest.mark.parametrize("chunk", [700, 3000])
+def test_derivatives_of_a_distance_are_those_of_the_readings(chunk, monkeypatch):
+    """Of a sensor with memory too, whose fitted field hangs on earlier readings."""
+    monkeypatch.setattr("barberpole.fit.residual.CHUNK", chunk)
+    rng, n = np.random.default_rng(3), 900
+    turn = np.cumsum(rng.normal(size=(3, n)), axis=1)
+    turn *= 50.0 / np.linalg.norm(turn, axis=0)
+    at = Conditions(state=np.zeros(n), t_s=np.arange(n) / 100.0)
+    for effects in (("bias", "scale", "misalignment"), ("bias", "scale", "misalignment", "lag")):
+        setup = Setup(reference="constant", lsb_per_ut=3.0, duration_s=9.0, interval_s=0.01)
+        model = compose(effects, setup)
+        p = model.first + 0.01 * np.array([q.typical for q in model.params])
+        y = model.predict(turn, p, at)
+        problem = Problem(model, Observations(y, at, None, None, np.arange(n), "constant", False), 50.0)
+        assert np.max(np.abs(problem.residual(p))) < 1e-9
+        found = np.concatenate([problem.linearisation(p)(rows)[1] for rows in problem.chunks()], axis=2)[0]
+        for j, param in enumerate(model.params):
+            step = np.zeros(len(p))
+            step[j] = 1e-5 * param.typical
+            slope = (problem.residual(p + step) - problem.residual(p - step))[0] / (2 * step[j])
+            settled = slice(5, None)
+            assert found[j][settled] == pytest.approx(-slope[settled], rel=0.02, abs=0.02 * np.abs(slope).max()), param
+
+
+def test_moments_of_all_readings_are_not_used_where_some_are_not_believed():
+    log = log_of(record(Recipe({}, rows=800)))
+    seen = observations(log)
+    fit = fit_observations(seen, ModelFile(("bias", "scale")))
+    believed = np.random.default_rng(2).random(seen.y.shape) > 0.1
+    some = Problem(fit.model, seen, believed=believed, moments=moments(seen.y, np.asarray(seen.b_ut)))
+    gram = some.gram(fit.p)
+    assert gram.count == np.count_nonzero(believed)
+    assert gram.cost == pytest.approx(np.sum((some.residual(fit.p) * believed) ** 2), rel=1e-9)
+    assert Problem(fit.model, seen, moments=some.moments)._known is some.moments
+    assert some._known is None
+    assert some.largest == np.max(np.abs(seen.y))
 
 
 def test_coefficients_over_standard_errors_are_those_of_a_regression():
