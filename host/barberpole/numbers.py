@@ -36,15 +36,18 @@ def uncertain(value: float, stderr: float) -> str:
 
 
 def with_error(value: float, stderr: float) -> tuple[str, str]:
-    """The same as two cells of a table, two figures of the error: ("2820", "120"), ("0.00293", "0.00061")."""
+    """The same as two cells of a table, two figures of the error: ("2820", "120"), ("0.00293", "0.00061").
+
+    A value below its error keeps two figures of its own.
+    """
     if not math.isfinite(stderr) or stderr <= 0:
         return f"{value:.6g}", ""
-    figures = 1 - math.floor(math.log10(stderr))
+    size = math.floor(math.log10(abs(value))) if value else 0
+    of_error = 1 - math.floor(math.log10(stderr))
+    figures = max(of_error, 1 - size) if value else of_error
     if not -4 <= figures <= 7:
-        digits = figures + math.floor(math.log10(abs(value))) + 1 if value else 1
-        return f"{value:.{max(digits, 1)}g}", f"{stderr:.2g}"
-    after = max(figures, 0)
-    return f"{round(value, figures):.{after}f}", f"{round(stderr, figures):.{after}f}"
+        return f"{value:.{max(figures + size + 1, 1)}g}", f"{stderr:.2g}"
+    return f"{round(value, figures):.{max(figures, 0)}f}", f"{round(stderr, of_error):.{max(of_error, 0)}f}"
 
 
 def chance(p_value: float) -> str:

@@ -147,6 +147,15 @@ def test_a_picture_of_a_million_rows_is_small():
     assert len(residual_against(y, y[0], "the x field, µT").plot.to_json()) < 400_000
 
 
+def test_what_a_magnitude_leaves_is_a_share_of_it_and_not_of_its_scatter():
+    t = np.arange(1000.0)
+    norm = 50.0 + 0.5 * np.sqrt(2.0) * np.sin(t)
+    drawn = traces(t, norm[None], np.full((1, 1000), 50.0), ("norm",), "µT")
+    assert drawn.title == "The model leaves 1 % of the field"
+    assert "the field is 50 µT" in drawn.sentence
+    assert "90" not in traces(t, norm[None], norm[None] - 0.001, ("norm",), "µT").title
+
+
 def test_the_pattern_is_the_title_and_the_means_follow_it(bent):
     fit, found, _ = bent
     pattern = found.patterns[0]

@@ -100,6 +100,8 @@ def test_adding_tells_the_noise_that_a_comparison_tells(turned, capsys):
         (1.5e-9, 2e-11, ("1.5e-09", "2e-11")),
         (-3.77678e-5, 3.1e-7, ("-3.777e-05", "3.1e-07")),
         (1e-9, 3e-7, ("1e-09", "3e-07")),
+        (0.000318, 0.0021, ("0.00032", "0.0021")),
+        (0.0, 0.0021, ("0.0000", "0.0021")),
     ],
 )
 def test_a_value_is_shown_to_the_digits_that_its_error_leaves(value, error, shown):

@@ -52,6 +52,24 @@ def test_the_hidden_effect_is_seen_added_undone_and_redone(window, crossed, shot
     window.wait_for_selector(".bp-fall:not(.floor)")
 
 
+def test_a_narrow_window_has_one_column_and_what_is_not_drawn_is_empty(window, crossed, shots):
+    open_log(window, crossed)
+    named(window, "cross_field")
+    window.set_viewport_size({"width": 390, "height": 850})
+    try:
+        window.wait_for_function("() => document.documentElement.scrollWidth <= innerWidth")
+        boxes = window.evaluate(
+            "() => [...document.querySelector('.bp-main').children].map(e => e.getBoundingClientRect())"
+        )
+        assert all(box["left"] >= 0 and box["width"] == boxes[0]["width"] for box in boxes)
+        window.screenshot(path=shots / "narrow.png", full_page=True)
+        empty = window.locator(".js-plotly-plot:not(:has(.trace))")
+        assert empty.count() > 0
+        assert empty.locator(".xtick").count() == 0
+    finally:
+        window.set_viewport_size({"width": 1280, "height": 900})
+
+
 def test_a_level_one_trial_is_solved_from_the_page_alone(window, server, shots):
     window.goto(f"{server}?seed=3")
     window.click("text=Level 1")

@@ -12,6 +12,7 @@ from barberpole.figures.theme import LIGHT, MEASURED, look
 from barberpole.numbers import plain
 
 ROW = 130  # px of one axis
+CONSTANT = 1e-6  # of its size, within which a modelled magnitude does not vary
 
 
 def traces(
@@ -41,14 +42,24 @@ def traces(
     figure.update_xaxes(title_text=t_name, row=rows, col=1)
     figure.update_layout(template=LIGHT, height=ROW * rows + 90)
     rms = np.sqrt(np.mean((measured - modelled) ** 2))
-    size = np.sqrt(np.mean((measured - measured.mean(axis=1, keepdims=True)) ** 2))
-    share = 100.0 * rms / max(float(size), 1e-300)
-    title = f"The model leaves {plain(share, 3)} % of what the readings vary by"
+    title, size = _left(rms, measured, modelled, unit)
     sentence = (
         f"{t.size} readings of {', '.join(axes)} against {t_name.split(',')[0]}, measured in grey under the model in "
-        f"colour; they vary by {plain(size)} {unit} rms, and {plain(rms)} {unit} rms are left (last row)."
+        f"colour; {size}, and {plain(rms)} {unit} rms are left (last row)."
     )
     return Figure(figure, title, sentence)
+
+
+def _left(rms: float, measured: np.ndarray, modelled: np.ndarray, unit: str) -> tuple[str, str]:
+    """What is left as a share of what a model can follow; a magnitude that should not vary, as one of itself."""
+    if len(modelled) == 1 and np.ptp(modelled) < CONSTANT * np.mean(np.abs(modelled)):
+        whole = float(np.mean(np.abs(modelled)))
+        return f"The model leaves {plain(100.0 * rms / max(whole, 1e-300), 3)} % of the field", (
+            f"the field is {plain(whole)} {unit}"
+        )
+    size = float(np.sqrt(np.mean((measured - measured.mean(axis=1, keepdims=True)) ** 2)))
+    share = plain(100.0 * rms / max(size, 1e-300), 3)
+    return f"The model leaves {share} % of what the readings vary by", f"they vary by {plain(size)} {unit} rms"
 
 
 def _pair(figure: go.Figure, row: int, axis: str, t: np.ndarray, measured, modelled, most: int) -> None:

@@ -30,9 +30,10 @@ class Answer:
         return Answer(value, pointer)
 
     def number(self, *keys: str | int, form: Callable[[Any], str] = plain) -> Markup:
-        """One number as the page shows it."""
+        """One number as the page shows it: a count with all its digits, others by `form`."""
         part = self.at(*keys)
-        text = "not known" if part.value is None else form(part.value)
+        known = str if isinstance(part.value, int) else form
+        text = "not known" if part.value is None else known(part.value)
         shown = "" if part.value is None else repr(part.value)
         return Markup('<data value="{}" data-from="{}">{}</data>').format(shown, part.pointer, text)
 

@@ -13,7 +13,7 @@ from barberpole import __version__
 from barberpole.figures import gains, parameters, points
 from barberpole.figures.figure import listed
 from barberpole.figures.parameters import SURE
-from barberpole.numbers import plain, signed
+from barberpole.numbers import plain, signed, with_error
 from barberpole.report.cited import Answer
 from barberpole.report.page import Section, Table, Text, write_page
 from barberpole.report.parts import checks, fails, falls, follows, grounds, missing
@@ -137,7 +137,8 @@ def worth(study: Study, answer: Answer) -> Section:
 
 def _row(name: str, study: Study, answer: Answer) -> list[Text]:
     part = answer.at("fit", "parameters", name)
-    row: list[Text] = [name, part.number("value", form=lambda v: f"{v:.7g}"), part.number("stderr", form=_error)]
+    value, error = with_error(part.value["value"], part.value["stderr"] or 0.0)
+    row: list[Text] = [name, part.number("value", form=lambda _: value), part.number("stderr", form=lambda _: error)]
     row.append(study.values[name].unit.replace("uT", "µT"))
     if not study.factory:
         return row
@@ -146,10 +147,6 @@ def _row(name: str, study: Study, answer: Answer) -> list[Text]:
     then = answer.at("factory", name)
     numbers = (("value", lambda v: f"{v:.7g}"), ("change", lambda v: signed(v, 2)), ("sigma", lambda v: signed(v, 2)))
     return [*row, *(then.number(key, form=form) for key, form in numbers)]
-
-
-def _error(value: float) -> str:
-    return f"{value:.2g}"
 
 
 def selfcal(study: Study, answer: Answer) -> Section:

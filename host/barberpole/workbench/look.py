@@ -1,5 +1,7 @@
 """How the page looks: the colours and letters of the pictures, on light and dark ground."""
 
+from typing import Any
+
 from barberpole.figures.theme import BLUE, DARK_GROUND, FONT, GREEN, LIGHT_GROUND, VERMILLION, Ground
 
 
@@ -112,5 +114,21 @@ RULES = """
 .bp-par td:first-child, .bp-par th:first-child { text-align:left; }
 .js-plotly-plot { width:100%; }
 @media (max-width:1180px) { .bp-main { grid-template-columns:220px minmax(0,1fr) 300px; } }
+@media (max-width:900px) {
+  .bp-main, .bp-live, .bp-verdict { grid-template-columns:minmax(0,1fr); }
+  .bp-verdict { height:auto; gap:12px; }
+  .bp-head { height:auto; min-height:52px; flex-wrap:wrap; padding:4px 16px; position:static; }
+  .bp-side { position:static; max-height:none; }
+  .bp-mid { border-left:0; border-right:0; border-top:1px solid var(--grid); min-height:0; order:2; }
+  nav.bp-side { order:3; }
+  .bp-live > section { border-right:0; }
+}
 @media (prefers-reduced-motion:reduce) { .bp-fall i, .bp-fall u { transition:none; } }
 """
+
+
+def blank(height: int) -> dict[str, Any]:
+    """The layout of a picture that is not drawn yet: nothing, on either ground."""
+    clear = "rgba(0,0,0,0)"
+    grounds, axes = {"paper_bgcolor": clear, "plot_bgcolor": clear}, {"xaxis": {"visible": False}}
+    return {"height": height, "autosize": True, **grounds, **axes, "yaxis": {"visible": False}}

@@ -13,6 +13,7 @@ from barberpole.figures.figure import plot
 from barberpole.figures.theme import BLUE, DARK, GREEN, LIGHT, PURPLE, VERMILLION, look
 from barberpole.reasons import TABLE
 from barberpole.workbench.guard import below
+from barberpole.workbench.look import blank
 from barberpole.workbench.rotation import Bound, U, bound
 from barberpole.workbench.watch import Seen, Watch
 from barberpole.workbench.widgets import complain, press, text_of
@@ -135,7 +136,7 @@ class LivePicture:
 
 
 def _empty(height: int) -> dict:
-    return {"data": [], "layout": {"height": height}, "config": CONFIG}
+    return {"data": [], "layout": blank(height), "config": CONFIG}
 
 
 def _state(seen: Seen) -> str:

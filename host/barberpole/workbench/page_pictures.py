@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import events, ui
 
 from barberpole.figures import CONFIG, Stage, waterfall
+from barberpole.workbench.look import blank
 from barberpole.workbench.pictures import HEIGHTS, Box, Picture, View
 from barberpole.workbench.widgets import press, text_of
 
@@ -32,7 +33,7 @@ class Frame:
             self._title = text_of("", "h3")
             if before:
                 before()
-            empty = {"data": [], "layout": {"height": height, "autosize": True}, "config": CONFIG}
+            empty = {"data": [], "layout": blank(height), "config": CONFIG}
             self.plot = ui.plotly(empty).style(f"height:{height}px;width:100%")
             self._sentence = text_of("", "p")
 

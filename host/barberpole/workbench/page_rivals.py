@@ -7,6 +7,7 @@ from nicegui import ui
 from barberpole.figures import CONFIG
 from barberpole.figures.figure import plot
 from barberpole.figures.theme import BLUE, DARK, LIGHT, VERMILLION
+from barberpole.workbench.look import blank
 from barberpole.workbench.rivals import Comparison
 from barberpole.workbench.widgets import text_of
 
@@ -25,7 +26,7 @@ class Rivals:
             text_of("Which model is better on data it was not fitted to?", "h2", "bp-title")
             self._other = ui.select({}, label="The model on the bench against", on_change=self._compare)
             self._other.props("dense outlined").style("width:100%")
-            self._plot = ui.plotly({"data": [], "layout": {"height": HEIGHT}, "config": CONFIG})
+            self._plot = ui.plotly({"data": [], "layout": blank(HEIGHT), "config": CONFIG})
             self._plot.style(f"height:{HEIGHT}px;width:100%")
             self._said = text_of("", "p").props("role=status data-test=rivals").style("min-height:40px;margin:0")
             ui.button("Close", on_click=self._dialog.close).props("flat no-caps color=accent")
