@@ -1,6 +1,7 @@
 # bp_console.py: lines that a host sends over the port of the REPL while the board works. Looking for them allocates
-# nothing. Control characters, by which mpremote asks for its prompt, end a line that is then forgotten; Ctrl-C never
-# comes here, it ends the program.
+# nothing. Bytes are read and not characters: half a character of UTF-8 would be waited for, and one that is none
+# would raise. What is not printable ASCII, mpremote's control characters among it, ends a line that is then forgotten;
+# Ctrl-C never comes here, it ends the program.
 import select
 import sys
 
@@ -14,6 +15,7 @@ class Console:
         self._poll = select.poll()
         self._poll.register(sys.stdin, select.POLLIN)
         self._line = ""
+        self._byte = bytearray(1)
         for _ in self._poll.ipoll(0):  # it makes its tuple at the first look
             pass
 
@@ -24,9 +26,11 @@ class Console:
         return self._read() if ready else None
 
     def _read(self):
-        char = sys.stdin.read(1)
-        if char in ("\n", "\r"):
+        if not sys.stdin.buffer.readinto(self._byte):
+            return None
+        code = self._byte[0]
+        if code == 10 or code == 13:
             line, self._line = self._line, ""
             return line.strip() or None
-        self._line = "" if not char or char < " " or len(self._line) >= _LONGEST else self._line + char
+        self._line = self._line + chr(code) if 32 <= code < 127 and len(self._line) < _LONGEST else ""
         return None

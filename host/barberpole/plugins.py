@@ -7,7 +7,7 @@ import hashlib
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 
 import numpy as np
 
@@ -73,15 +73,24 @@ def _execute(path: Path) -> ModuleType:
     module.__file__ = str(path)
     text = read_text(path, "a plugin")
     _say(path, text)
+    code = compiled(text, path)
     try:
-        exec(compile(text, str(path), "exec"), module.__dict__)
-    except SyntaxError as error:
-        where = f"{path}, line {error.lineno}"
-        raise InputError(must("a plugin", "valid Python", error.msg, where)) from error
-    except Exception as error:
+        exec(code, module.__dict__)
+    except (Exception, SystemExit) as error:
         where = plugin_trial.line_of(path, error)
         raise InputError(must("a plugin", "a file that runs", plugin_trial.said(error), where)) from error
     return module
+
+
+def compiled(text: str, path: Path) -> CodeType:
+    """The text as code, not run yet. Raises InputError where it is no Python."""
+    try:
+        return compile(text, str(path), "exec")
+    except SyntaxError as error:
+        where = f"{path}, line {error.lineno}"
+        raise InputError(must("a plugin", "valid Python", error.msg, where)) from error
+    except (ValueError, RecursionError, MemoryError, OverflowError) as error:  # NUL bytes, brackets without end
+        raise InputError(must("a plugin", "valid Python", plugin_trial.said(error), path)) from error
 
 
 def _say(path: Path, text: str) -> None:
@@ -91,6 +100,13 @@ def _say(path: Path, text: str) -> None:
         _ran.add(this)
         for say in SAID:
             say(path)
+
+
+def _requires(module: ModuleType) -> tuple[str, ...]:
+    found = getattr(module, "REQUIRES", ())
+    if not isinstance(found, tuple | list) or not all(isinstance(name, str) for name in found):
+        raise InputError(must("REQUIRES", "a list of columns", repr(found), module.__file__))
+    return tuple(found)
 
 
 def _as_written(name: str, module: ModuleType) -> Effect:
@@ -105,7 +121,7 @@ def _as_written(name: str, module: ModuleType) -> Effect:
         module.params,
         module.forward,
         getattr(module, "undo", None),
-        requires=tuple(getattr(module, "REQUIRES", ())),
+        requires=_requires(module),
         flips=bool(getattr(module, "FLIPS", False)),
         summary=str(getattr(module, "SUMMARY", "")),
         memory=bool(getattr(module, "MEMORY", False)),

@@ -17,12 +17,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from barberpole import files
+from barberpole.arrays.keeping import read_array
 from barberpole.cli import run
 from barberpole.errors import LONGEST, InputError, must
 from barberpole.fleet.table import META, read_fleet
 from barberpole.imcs import read_driven
 from barberpole.log import read_log
 from barberpole.modelfile import model_text, read_model
+from barberpole.paths import boards
+from barberpole.plugins import TEMPLATE, compiled, load_plugin
 from barberpole.records import encode, encode_json, parse
 from fuzzing.many import with_meta, write_fleet
 from fuzzing.one import DRIVER, driver_records, header_text
@@ -339,6 +342,45 @@ def test_a_sealed_answer_that_unpacks_without_end():
     packed = zlib.compress(json.dumps("a" * 50_000_000).encode())
     assert len(b64encode(packed)) < 100_000
     assert len(_unpacked(packed)) <= 1 << 20
+
+
+@pytest.mark.parametrize("content", [{}, {"hidden": "lag"}, {"hidden": ["nothing of ours"]}, [1], 3])
+def test_a_sealed_answer_of_others(tmp_path, refused, content):
+    (tmp_path / "answer.sealed").write_bytes(b64encode(zlib.compress(json.dumps(content).encode())))
+    assert "as `challenge new` wrote it" in refused("challenge", "answer", tmp_path, "lag")
+
+
+def test_a_pin_of_thousands_of_digits(tmp_path, capsys):
+    text = (boards() / "pybv11.toml").read_text()
+    path = tmp_path / "board.toml"
+    path.write_text(text.replace('set_pin = "Y1"', f'set_pin = "PA{"7" * 5000}"'))
+    assert run(["board", "check", str(path)]) in (1, 2)
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("values", ["[1, 2]", "[1, 2, nan]", f"[1, 2, {10**400}]", '"a"'])
+def test_an_array_calibration_that_cannot_be(tmp_path, values):
+    path = tmp_path / "array.toml"
+    one = f"matrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nbias_ut = [0, 0, 0]\ngain = {values}\n"
+    path.write_text(f"format = 1\n[sensor.a]\n{one}[sensor.b]\n{one}")
+    with pytest.raises(InputError, match="a gap"):
+        read_array(path, ("a", "b"))
+
+
+@pytest.mark.parametrize(
+    ("line", "wanted"), [("REQUIRES = 3", "a list of columns"), ("raise SystemExit", "a file that runs")]
+)
+def test_a_plugin_that_is_none(tmp_path, line, wanted):
+    path = tmp_path / "mine.py"
+    path.write_text(TEMPLATE.read_text().replace("NAME", "mine") + f"\n{line}\n")
+    with pytest.raises(InputError, match=wanted):
+        load_plugin(path)
+
+
+@pytest.mark.parametrize("text", ["a = 1\0", "(" * 100_000, "a = " + "-" * 100_000 + "1"])
+def test_a_plugin_that_is_no_python(text):
+    with pytest.raises(InputError, match="valid Python"):
+        compiled(text, Path("mine.py"))
 
 
 def test_a_sentence_tells_what_was_got_and_not_all_of_it():

@@ -37,10 +37,10 @@ def read_array(path: Path, names: tuple[str, ...]) -> OfArray:
         return OfArray(
             {n: _affine(sensors[n], "matrix", "bias_ut") for n in names},
             {n: _affine(sensors[n], "sc_sigma_c", "bc_ut") for n in names if "sc_sigma_c" in sensors[n]},
-            {n: np.array(sensors[n]["gain"], float) for n in names},
+            {n: _shaped(sensors[n]["gain"], 3) for n in names},
             {n: float(sensors[n]["left_ut"]) for n in names if "left_ut" in sensors[n]},
         )
-    except (KeyError, ValueError, TypeError):
+    except (KeyError, ValueError, TypeError, OverflowError):
         raise InputError(must("the array's calibration", "as `barberpole array` wrote it", "a gap", path)) from None
 
 
@@ -57,7 +57,12 @@ def _sensor(found: OfArray, name: str) -> dict[str, Any]:
 
 
 def _affine(table: dict[str, Any], matrix: str, bias: str) -> Affine:
-    a, b = np.array(table[matrix], float), np.array(table[bias], float)
-    if a.shape != (3, 3) or b.shape != (3,):
+    return Affine(_shaped(table[matrix], 3, 3), _shaped(table[bias], 3))
+
+
+def _shaped(values: Any, *shape: int) -> np.ndarray:
+    """An array of this shape. Raises ValueError or TypeError where the values are none, or not numbers."""
+    found = np.array(values, float)
+    if found.shape != shape or not np.all(np.isfinite(found)):
         raise ValueError
-    return Affine(a, b)
+    return found

@@ -93,7 +93,7 @@ def _draw(level: Level, rng: np.random.Generator) -> list[str]:
 
 def answer(folder: Path, given: tuple[str, ...]) -> Opened:
     """Open the sealed answer. Raises InputError where there is none, or for a name that is no effect."""
-    hidden = tuple(_unseal(folder / SEALED)["hidden"])
+    hidden = unsealed(folder / SEALED)
     for name in given:
         if name not in (*CATALOGUE, NOTHING, UNKNOWN):
             raise InputError(must("the answer", f"of {', '.join((*CATALOGUE, NOTHING, UNKNOWN))}", repr(name)))
@@ -121,8 +121,13 @@ def _unpacked(sealed: bytes) -> bytes:
     return zlib.decompressobj().decompress(sealed, LARGEST_ANSWER)
 
 
-def _unseal(path: Path) -> dict:
+def unsealed(path: Path) -> tuple[str, ...]:
+    """What was hidden. Raises InputError where the answer is none of ours."""
     try:
-        return json.loads(_unpacked(base64.b64decode(read_text(path, "the sealed answer"))))
-    except (ValueError, zlib.error):
-        raise InputError(must("the sealed answer", "as `challenge new` wrote it", "another content", path)) from None
+        content = json.loads(_unpacked(base64.b64decode(read_text(path, "the sealed answer"))))
+        hidden = content["hidden"]
+    except (ValueError, zlib.error, KeyError, TypeError, RecursionError):
+        hidden = None
+    if not isinstance(hidden, list) or not all(name in (*CATALOGUE, *FOREIGN) for name in hidden):
+        raise InputError(must("the sealed answer", "as `challenge new` wrote it", "another content", path))
+    return tuple(hidden)

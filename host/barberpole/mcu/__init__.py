@@ -12,6 +12,7 @@ from pathlib import Path
 from barberpole.errors import InputError, must
 
 FOLDER = Path(__file__).parent
+PIN_DIGITS = 2  # of a pin within its port
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ class Pinout:
             return self.pins[name]
         bare = name.removeprefix(self.port_prefix)
         letter, number = bare[:1], bare[1:]
-        known = self.port_prefix + bare == name and number.isdecimal() and int(number) < self.ports.get(letter, 0)
+        few = number.isdecimal() and len(number) <= PIN_DIGITS  # Python refuses to count thousands of digits
+        known = self.port_prefix + bare == name and few and int(number) < self.ports.get(letter, 0)
         return f"P{letter}{int(number)}" if known else None
 
     def label(self, port: str) -> str:
