@@ -77,7 +77,7 @@ clean:
 
 $(STAMP): pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@echo "installing barberpole and its tools into $(VENV) (once)"
+	@echo "installing barberpole and its tools into $(VENV) (once; some minutes, and it says nothing meanwhile)"
 	@$(PIP) --editable '.[twin,fleet,test]'
 	@touch $@
 

@@ -93,7 +93,7 @@ def run(arguments: list[str]) -> int:
     except typer.Exit as leave:
         return leave.exit_code
     except typer.TyperException as usage:
-        return _refuse(usage.format_message())
+        return _refuse(usage.format_message().replace("Value error, ", ""))
     except BarberpoleError as error:
         return _refuse(str(error))
     except (KeyboardInterrupt, typer.Abort):

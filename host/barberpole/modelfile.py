@@ -137,6 +137,9 @@ def _from_file(path: Path) -> ModelFile:
     listed = tables.get("effects")
     names = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
     settings = {name: tables.pop(name) for name in list(tables) if name in names and isinstance(tables[name], dict)}
+    if {"format", "parameters", "model"} <= tables.keys():
+        got = "a calibration (`verify --calibration` and `report --calibration` hold one against a log)"
+        raise InputError(must("the model file", "one that lists effects", got, path))
     for name in tables:
         if name not in KEYS:
             raise InputError(unknown(name, [*KEYS, *names], "the model file", path))

@@ -21,6 +21,7 @@ from barberpole.verify import coils_driven
 
 BANDS, SECTORS = 6, 12  # of directions, all of equal area: one is 27° across
 GAP = 3.0  # median intervals
+FEW = 30  # readings, of which none is told from the others
 SPIKE = 10.0  # robust standard deviations from both neighbours
 QUIET = 0.3  # of the spread of the whole log: what rests varies less
 LEVEL_C = 2.0  # span of temperature below which its effects hardly show
@@ -203,7 +204,7 @@ def spikes(seen: Observations) -> dict[str, int]:
     state = np.broadcast_to(np.asarray(seen.at.state, float), seen.y.shape[1:])
     for kind in np.unique(state):
         own = np.flatnonzero(state == kind)
-        if own.size < 5:
+        if own.size < FEW:
             continue
         y, beside = seen.y[:, own], own[2:] - own[:-2] == 2 * np.min(np.diff(own))
         off = y[:, 1:-1] - 0.5 * (y[:, 2:] + y[:, :-2])
@@ -228,6 +229,11 @@ def _shows(log: Log, seen: Observations, covered: float) -> tuple[tuple[str, ...
     return tuple(shows), cannot
 
 
+def _could_cover(rows: int) -> float:
+    """Part of the directions that so many readings see, each pointing anywhere."""
+    return 1.0 - (1.0 - 1.0 / (BANDS * SECTORS)) ** rows
+
+
 def _why_not(name: str, lacking: tuple[str, ...], log: Log, seen: Observations, covered: float) -> str:
     if lacking:
         return f"no {' and no '.join(lacking)} column"
@@ -240,6 +246,6 @@ def _why_not(name: str, lacking: tuple[str, ...], log: Log, seen: Observations, 
     state = np.asarray(seen.at.state)
     if name == "flip_asymmetry" and not (np.any(state > 0) and np.any(state < 0)):
         return "SET and RESET are not both there"
-    if name not in NEED_NO_TURNS and covered < SURROUNDED:
+    if name not in NEED_NO_TURNS and covered < SURROUNDED * _could_cover(log.n):
         return f"the field pointed into {100 * covered:.0f} % of the directions only"
     return ""

@@ -64,10 +64,9 @@ def verify(log: Log, calibration: Calibration, stream: LogStream | None = None) 
     if not coils_driven(log):
         checks += _readings(log, calibration, fitted, stream)
     if not checks:
-        got = "a coil run without its verdict"
-        raise InputError(
-            must("the log", "one with readings at rest, or a board's own record of a power-up", got, log.path)
-        )
+        wanted = "one with the offset coils at rest, or a board's own record of a power-up"
+        got = "currents in ix_ma..iz_ma, and no verdict of a board's own run"
+        raise InputError(must("the log", wanted, got, log.path))
     return Verification(tuple(checks))
 
 

@@ -2,6 +2,7 @@
 
 import fcntl
 import io
+import json
 import os
 import pty
 import re
@@ -110,3 +111,31 @@ def test_a_value_is_shown_to_the_digits_that_its_error_leaves(value, error, show
 
 def test_no_chance_is_told_that_cannot_be_computed():
     assert [chance(p) for p in (1e-300, 0.0, 2.24e-8)] == ["<1e-300", "<1e-300", "2.2e-08"]
+
+
+def test_a_calibration_given_as_a_model_is_told_where_it_belongs(turned, tmp_path, capsys):
+    made = str(tmp_path / "cal.toml")
+    assert run(["fit", str(turned), "--model", "bias,scale", "-o", made]) == 0
+    assert run(["compare", str(turned), "--model", made]) == 2
+    assert "must be one that lists effects; got a calibration (`verify --calibration`" in capsys.readouterr().err
+
+
+def test_a_word_that_is_no_choice_is_told_the_choices(capsys):
+    assert run(["command", "dance", "--port", "P"]) == 2
+    assert "Invalid value for 'asked': 'dance' is not one of 'status'" in capsys.readouterr().err
+
+
+def test_few_careful_orientations_are_not_called_one_sided(tmp_path, capsys):
+    """24 shots can see a third of 72 directions at most."""
+    rng = np.random.default_rng(5)
+    b = rng.normal(size=(3, 24))
+    b *= 48.0 / np.linalg.norm(b, axis=0)
+    path = tmp_path / "shots.csv"
+    np.savetxt(path, b.T, "%.6g", ",", header="x_lsb,y_lsb,z_lsb", comments="")
+    assert run(["summary", str(path), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert {"bias", "scale", "misalignment"} <= set(said["shows"])
+    assert said["spikes"] == {"x": 0, "y": 0, "z": 0}
+    np.savetxt(path, np.abs(b).T, "%.6g", ",", header="x_lsb,y_lsb,z_lsb", comments="")
+    assert run(["summary", str(path), "--json"]) == 0
+    assert "bias" in json.loads(capsys.readouterr().out)["cannot_show"]

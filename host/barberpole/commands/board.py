@@ -20,6 +20,7 @@ from barberpole.link.record import soft_reset
 from barberpole.log import read_log, write_log
 
 RECORDS, TABLES = ".bpr", (".csv", ".parquet")
+SECOND_US = 1e6
 WAYS = {
     "mpy": ".mpy files, of the file system",
     "romfs": "ROMFS image, of the partition",
@@ -77,7 +78,7 @@ def _budget_table(budget: dict):
         shown.add_row(WAYS[way], f"{room['bytes']} of {room['of']} bytes{fits}")
     for what, figure in budget["time_us"].items():
         if isinstance(figure, int | float):
-            shown.add_row(what, f"{figure:.0f} µs")
+            shown.add_row(what.replace("_", " "), f"{figure:.0f} µs" if figure < SECOND_US else f"{figure / 1e6:.3f} s")
     shown.add_row("a streamed row", budget["time_us"]["path"])
     if budget["fixed_point"]:
         figure = f"{budget['fixed_point']['error_nt']:.2g} nT within ±{budget['fixed_point']['range_ut']:g} µT"
