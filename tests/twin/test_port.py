@@ -1,7 +1,9 @@
 """The port as a PC sees it: unmodified mpremote, and a terminal program."""
 
+import os
 import subprocess
 import sys
+import termios
 import time
 
 import pytest
@@ -70,6 +72,40 @@ def test_output_waits_for_a_reader(start):
     with serial.Serial(twin.port, timeout=1.0) as port:
         lines = [port.readline() for _ in range(500)]
     assert lines == [b"row %d\r\n" % (i + 1) for i in range(500)]
+
+
+def read_rows(port, count):
+    text = b""
+    while text.count(b"\n") < count:
+        text += os.read(port, 4096)
+    return text.splitlines()[:count]
+
+
+ROWS = [b"row %d" % (i + 1) for i in range(500)]
+
+
+def test_a_reader_that_takes_its_time_to_empty_the_port_loses_nothing(start):
+    twin = start("forever.py")
+    twin.wait_until(1.0)
+    port = os.open(twin.port, os.O_RDWR | os.O_NOCTTY)
+    time.sleep(0.3)  # of a busy PC
+    termios.tcflush(port, termios.TCIFLUSH)
+    assert read_rows(port, len(ROWS)) == ROWS
+    os.close(port)
+
+
+def test_a_reader_that_empties_nothing_loses_nothing_and_finds_the_line_as_it_was(start):
+    twin = start("forever.py")
+    twin.kill()
+    with serial.Serial(twin.port, timeout=0.0) as port:  # which leaves a line whose reads do not wait
+        port.read(1 << 20)
+    time.sleep(0.2)
+    twin.power_cycle()
+    port = os.open(twin.port, os.O_RDONLY | os.O_NOCTTY)
+    assert termios.tcgetattr(port)[6][termios.VMIN] == 1
+    twin.wait_until(1.0)
+    assert read_rows(port, len(ROWS)) == ROWS
+    os.close(port)
 
 
 @pytest.fixture

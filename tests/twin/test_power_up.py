@@ -101,9 +101,8 @@ def test_a_host_that_joins_later_reads_the_stream(board, calibration, tmp_path):
     result = power_up(board, seed=4)
     record(board.port, tmp_path / "late.bpr", frames=600)
     log = read_log(tmp_path / "late.bpr")
-    # not all 600 are rows: header, verdict, as much of the coil run as nobody had read, and on a busy PC the few
-    # kilobytes that arrive while the reader is still setting up the port, and are cut
-    assert log.n > 500
+    assert log.n > 590  # the others: header, verdict, as much of the coil run as nobody had read
+    assert log.skipped <= 1
     assert np.median(np.diff(log["t_s"])) == pytest.approx(0.005, rel=0.01)
     assert log.meta["calibration"] == calibration.hash
     assert log.meta["result"]["in_force_gain"] == result["in_force_gain"]

@@ -30,7 +30,6 @@ AGEING = (0.004, -0.003, 0.002)  # of the gains in thirty days
 JUMPS_UT = ((1.8, -1.2, 2.4), (0.0, 0.9, 0.0), (-5.0, 0.0, 1.0))  # a car, a door, a lift
 JUMP_EVERY = 11  # power-ups, from number 5 on
 WARMING_EVERY = 8
-FREE = 0.8  # of one processor that a board gets on a machine without other work: interpreter and physics take turns
 USED = "import os; s = os.statvfs('/'); print((s[2] - s[3]) * s[1], *[os.stat('bp/' + n)[6] for n in os.listdir('bp')])"
 
 
@@ -167,5 +166,6 @@ def test_a_month(soaked):
     judge(diary)
     assert max(used for used, *_ in diary.flash[1:]) <= diary.flash[1][0] + 4096  # both files of the log are there
     assert len(diary.rejected()) > 50
-    if diary.cpu_s > FREE * diary.seconds:  # the wall time of a machine with other work says nothing
-        assert diary.seconds < 300.0
+    # interpreter and physics take turns, so a free machine needs little more wall time than this; other work on it
+    # stretches that without end
+    assert diary.cpu_s < 300.0

@@ -86,7 +86,7 @@ class BoardProcess:
 
     def _look(self, now_s: float) -> None:
         """Things that nobody tells us: whether the port was opened or closed, whether Ctrl-C has waited too long."""
-        self._watch(self._port.fileno, self._port.check_open())
+        self._watch(self._port.fileno, self._port.look())
         self._port.flush()
         if self._running:
             self._watch(self._running.terminal_fd, not self._port.is_full)  # a full port makes the board wait
@@ -103,7 +103,8 @@ class BoardProcess:
     def _serve_port(self) -> None:
         data = self._port.receive()
         if not data:
-            self._watch(self._port.fileno, self._port.check_open())
+            self._watch(self._port.fileno, self._port.look())
+            self._port.flush()
         elif self._running and self._running.receive(data):
             self._port.drop()
 
@@ -121,6 +122,7 @@ class BoardProcess:
         self._power_ups += 1
         self._crashes = 0
         self._cut = False
+        self._port.power_on()
         self._soldered = wired(self._job.board, power.world, power.seed, self._power_ups, power.faults)
         self._start(POWER_ON)
 
