@@ -196,6 +196,12 @@ def test_outliers_giants_and_jumps_are_told_from_noise():
     steps[2] += 0.8 * (np.arange(n) // 500 % 2)
     assert (tails.jumps(steps) > tails.LIKELIER).tolist() == [False, False, True]
     assert not tails.jumps(steps[:, :300]).any()
+    phase = 2 * np.pi * np.arange(n) / n
+    turning = np.array([np.cos(phase), np.sin(phase), 0 * phase])  # one turn: each step's normal is like the last one's
+    late = noise[:1] + 6.0 * (np.arange(n) > n // 2) * (np.arange(n) // 200 % 2)
+    assert tails.jumps(late, turning)[0] > tails.LIKELIER
+    rattling = np.where(np.arange(n) // 20 % 2, turning, turning[[2, 0, 1]])
+    assert tails.jumps(late, rattling)[0] == 0.0  # hardly anything lies between turns
 
 
 def test_a_jump_is_said_with_its_chance():
