@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg.lapack import dposv
+from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue] (made when scipy is loaded)
 
 BLOCKS = 10  # contiguous, so that a held-out stretch is really unseen; folds leave out two of them at a time
 FOLDS = 5

@@ -82,9 +82,13 @@ class Problem:
         """Half the range of the readings of the axis with the smallest, LSB."""
         return 0.5 * float(np.min(np.ptp(self.seen.y, axis=1)))
 
-    @cached_property
+    @property
     def largest(self) -> float:
         """The largest reading in LSB."""
+        return self._largest
+
+    @cached_property
+    def _largest(self) -> float:
         return max(float(np.max(self.seen.y, initial=0.0)), -float(np.min(self.seen.y, initial=0.0)))
 
     @cached_property
