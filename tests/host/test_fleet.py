@@ -212,6 +212,16 @@ def test_a_log_named_by_its_date_or_like_all_others_is_of_its_folders_board():
     assert vars(identity(Path("/lot3/b2/log.csv"), {}, pattern)) == {"board": "b2", "lot": "lot3", "date": None}
 
 
+def test_folders_of_one_name_in_two_lots_are_two_boards():
+    pattern = in_folders(["lot1/b1/log.csv", "lot2/b1/log.csv"])
+    assert [vars(identity(Path(f"/all/{lot}/b1/log.csv"), {}, pattern)) for lot in ("lot1", "lot2")] == [
+        {"board": "lot1/b1", "lot": "lot1", "date": None},
+        {"board": "lot2/b1", "lot": "lot2", "date": None},
+    ]
+    again = in_folders(["2026-05-01/b1/log.csv", "2026-06-01/b1/log.csv"])
+    assert identity(Path("2026-06-01/b1/log.csv"), {}, again).board == "b1"
+
+
 def test_boards_in_folders_are_boards(folder, tmp_path, capsys):
     for name in ("b1", "b2"):
         (tmp_path / "lot" / name).mkdir(parents=True)

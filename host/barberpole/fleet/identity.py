@@ -10,6 +10,7 @@ from barberpole.errors import InputError, must
 
 DATE = re.compile(r"[ ._-]?(?P<date>\d{4}-?\d{2}-?\d{2}(?:[T ._-]?\d{2}[:-]?\d{2}(?:[:-]?\d{2})?)?)(?!\d)")
 BY_FOLDER = r"(?P<board>[^/\\]+)[/\\][^/\\]+$"
+BY_TWO = r"(?P<board>[^/\\]+[/\\][^/\\]+)[/\\][^/\\]+$"
 GROUPS = ("board", "date", "lot")
 
 
@@ -29,7 +30,9 @@ def identity(path: Path, told: dict[str, Any], pattern: str | None = None) -> Id
     """
     named, folder = _by_pattern(path, pattern), path.absolute().parent
     board = told.get("uid") or told.get("board_id") or named.get("board") or DATE.sub("", path.stem)
-    if not board or named.get("board") == folder.name:  # the folder is the board's, its folder the lot's
+    if (
+        not board or Path(named.get("board") or ".").name == folder.name
+    ):  # the folder is the board's, above it the lot's
         board, folder = board or folder.name, folder.parent
     lot = told.get("lot") or named.get("lot") or folder.name
     date = told.get("date") or named.get("date")
@@ -37,9 +40,15 @@ def identity(path: Path, told: dict[str, Any], pattern: str | None = None) -> Id
 
 
 def in_folders(paths: Sequence[str]) -> str | None:
-    """The pattern for logs that all have one name, each in its board's folder (b1/log.csv, b2/log.csv); else None."""
+    """The pattern for logs that all have one name, each in its board's folder (b1/log.csv, b2/log.csv); else None.
+
+    Folders of one name in several others (lot1/b1, lot2/b1) are several boards, unless those are dates.
+    """
     names, folders = {Path(path).name for path in paths}, {Path(path).parent for path in paths}
-    return BY_FOLDER if len(names) == 1 and len(folders) > 1 else None
+    if len(names) != 1 or len(folders) < 2:
+        return None
+    twice = len({folder.name for folder in folders}) < len(folders)
+    return BY_TWO if twice and not all(DATE.search(folder.parent.name) for folder in folders) else BY_FOLDER
 
 
 def check_pattern(pattern: str) -> str:
