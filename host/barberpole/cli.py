@@ -1,6 +1,9 @@
 """The command line: exit 0 done, 1 the answer is "no", 2 bad input with one clear sentence on stderr."""
 
-import barberpole.commands.interrupt as interrupt  # first: it stands for the time in which the others load
+try:
+    import barberpole.commands.interrupt as interrupt  # first: it stands for the time in which the others load
+except KeyboardInterrupt:  # while that one loads
+    raise SystemExit(130) from None
 
 # isort: split
 import sys
