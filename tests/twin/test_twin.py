@@ -179,7 +179,7 @@ def test_what_the_pyboard_does_not_have_is_refused(board, tmp_path):
 
 
 def test_parts_that_are_not_emulated_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"must be one with the ads131m08 .* got stm32f4_adc and stm32f4_dac"):
+    with pytest.raises(InputError, match=r"must be one with the ads131m08 .* like pybv11; got stm32f4_adc"):
         Twin(load_board("pybv11_timed"), tmp_path)
 
 

@@ -18,7 +18,7 @@ SPI_CLOCK_HZ = {1: 84_000_000, 2: 42_000_000}
 def check_pins(board: Board | Driver) -> None:
     """Raises InputError where the board file uses a part, a pin or a bus that the emulated pyboard does not have."""
     if (board.adc.part, board.dac.part) != PARTS:
-        be = f"one with the {PARTS[0]} and the {PARTS[1]}, and flips timed by the program"
+        be = f"one with the {PARTS[0]} and the {PARTS[1]} and with flips timed by the program, like pybv11"
         raise InputError(must("the emulated board", be, f"{board.adc.part} and {board.dac.part}", board.name))
     adc, dac = board.adc, board.dac
     flip: tuple[str, ...] = ()
