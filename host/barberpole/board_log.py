@@ -59,6 +59,8 @@ def read_board_log(data: bytes, where: object) -> BoardLog:
         notes.append(f"{orphans} frames before the first header cannot be read and were skipped")
     if earlier:
         notes.append(f"{earlier} frames of earlier power-ups were left out")
+    if twice := _take_once(power_up):
+        notes.append(f"{twice} records came twice and were taken once")
     selfcal, bad_points = _selfcal(power_up)
     columns, bad_rows = _rows(power_up, where)
     if bad_points + bad_rows:
@@ -109,6 +111,25 @@ def _last_power_up(frames: tuple[Frame, ...], where: object) -> tuple[_PowerUp, 
         raise InputError(must("the board record", "framed lines: a header, then rows or points", found, where))
     earlier = sum(len(kind) for p in telling[:-1] for kind in p.of.values())
     return telling[-1], orphans, earlier
+
+
+def _take_once(power_up: _PowerUp) -> int:
+    """Leave out rows and points that came before, under the same number with the same content; how many they were."""
+    count = 0
+    for kind in (ROWS, POINTS):
+        frames = power_up.of[kind]
+        steps = np.diff([frame.sequence for frame in frames]) % SEQUENCES
+        if not np.any((steps == 0) | (steps >= SEQUENCES // 2)):
+            continue  # as it should be: nothing to remember
+        seen: dict[int, bytes] = {}
+        kept = []
+        for frame in frames:
+            if seen.get(frame.sequence) != frame.payload:
+                kept.append(frame)
+            seen[frame.sequence] = frame.payload
+        count += len(frames) - len(kept)
+        power_up.of[kind] = kept
+    return count
 
 
 def _goes_on(header: dict[str, Any], frame: Frame, last: Frame) -> bool:

@@ -87,6 +87,7 @@ class Decoder:
         self.lost = 0
         self._pending = b""
         self._expected: int | None = None
+        self._furthest: int | None = None  # what is expected where a replay ends
         self._unexplained = 0  # damaged lines since the last frame: they account for a gap
 
     def feed(self, data: bytes) -> list[Frame]:
@@ -117,13 +118,26 @@ class Decoder:
         return frames
 
     def _counted(self, frame: Frame) -> Frame:
-        if self._expected is not None and not begins_power_up(frame):  # which counts afresh
-            gap = (frame.sequence - self._expected) % SEQUENCES
-            if gap < SEQUENCES // 2:  # it went back: a power-up whose header is damaged
-                self.lost += max(0, gap - self._unexplained)
+        if begins_power_up(frame):  # which counts afresh
+            self._furthest = None
+        elif self._expected is not None:
+            self.lost += max(0, self._gap(frame.sequence, self._expected) - self._unexplained)
         self._expected = (frame.sequence + 1) % SEQUENCES
         self._unexplained = 0
         return frame
+
+    def _gap(self, sequence: int, expected: int) -> int:
+        """Frames missing before this one. It may go back: a power-up whose header is damaged, or frames that come
+        again, after which the stream goes on where it was."""
+        gap = (sequence - expected) % SEQUENCES
+        if gap >= SEQUENCES // 2:
+            if self._furthest is None or (expected - self._furthest) % SEQUENCES < SEQUENCES // 2:
+                self._furthest = expected
+            return 0
+        if self._furthest is None or (beyond := (sequence - self._furthest) % SEQUENCES) >= SEQUENCES // 2:
+            return gap
+        self._furthest = None
+        return min(gap, beyond)
 
 
 def begins_power_up(frame: Frame) -> bool:
