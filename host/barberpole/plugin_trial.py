@@ -208,12 +208,12 @@ def _symbolic(trial: Trial) -> Conditions:
     return replace(trial.at, state=1.0, temp_c=temp_c)
 
 
-def said(error: Exception) -> str:
+def said(error: BaseException) -> str:
     """An exception as people read it."""
     return f"{type(error).__name__}: {error}"
 
 
-def line_of(path: Path, error: Exception) -> str:
+def line_of(path: Path, error: BaseException) -> str:
     """The plugin's file and the last line of it that the exception came through."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
     return f"{path}, line {lines[-1]}" if lines else str(path)
