@@ -13,6 +13,7 @@ from barberpole.errors import InputError, must
 from barberpole.fit.fit import NOMINAL_MAGNITUDE_UT, require_columns
 from barberpole.fit.residual import Problem
 from barberpole.fit.stream import Streamed
+from barberpole.fit.usable import require_microtesla
 from barberpole.fitted import Fitted, from_calibration
 from barberpole.log import Log
 from barberpole.log_stream import LogStream
@@ -135,6 +136,9 @@ def _readings(log: Log, calibration: Calibration, fitted: Fitted, stream: LogStr
     seen = _with_sensor(told, fitted, log)
     require_columns(seen, fitted.model.effects, load_plugins(calibration.model.plugins))
     magnitude = float(calibration.model.reference.get("magnitude_ut", NOMINAL_MAGNITUDE_UT))
+    known = seen.b_mag if seen.b_ut is None else np.linalg.norm(seen.b_ut, axis=0)
+    if known is not None:
+        require_microtesla(float(np.max(known)))  # a log in another unit tells nothing of the board
     problem = Problem(fitted.model, seen, magnitude)
     problems = (problem,) if stream is None else Streamed(stream, problem).problems()
     if problem.vector:

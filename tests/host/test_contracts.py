@@ -138,8 +138,12 @@ def test_a_wrong_unit_is_bad_input_to_fit_and_diagnose_alike(call, tmp_path, kno
     assert fitted[0] == judged[0] == 2
     assert fitted[2] == judged[2]
     assert "in µT" in judged[2]
-    code, (first, second), _ = call("diagnose", log, written(tmp_path / "good.csv", good), "--model", LINEAR)
+    right = written(tmp_path / "good.csv", good)
+    code, (first, second), _ = call("diagnose", log, right, "--model", LINEAR)
     assert (code, list(first), second["verdict"]) == (2, ["log", "error"], "adequate")
+    assert call("fit", right, "--model", LINEAR, "-o", tmp_path / "cal.toml")[0] == 0
+    code, _, said = call("verify", log, "--calibration", tmp_path / "cal.toml")  # no board that has changed
+    assert (code, said) == (2, judged[2])
 
 
 def test_a_column_that_the_model_needs_is_asked_for_by_fit_and_diagnose_alike(call, tmp_path):
