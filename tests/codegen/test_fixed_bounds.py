@@ -8,7 +8,7 @@ from barberpole.errors import LimitError
 from barberpole_codegen.fixed import BITS, MUL_OP, Fixed, Instruction, Interval, execute, exponent
 from barberpole_codegen.fixed_machine import ENOUGH, Machine, _line_to_inverse_root
 from barberpole_codegen.fixed_trace import _slow_interval, fix
-from barberpole_codegen.trace import ADD, DIV, MUL, NEG, SQRT, SUB, trace
+from barberpole_codegen.trace import ADD, DIV, MUL, NEG, SQRT, SUB, _number, trace
 
 N = 4000
 
@@ -133,3 +133,9 @@ def test_slow_values_stay_in_their_intervals():
             assert _slow_interval(SQRT, boxes[:1]) == Interval(np.sqrt(a), np.sqrt(b))
     assert _slow_interval(DIV, [Interval(1.0, 2.0), Interval(-4.0, -2.0)]) == Interval(-1.0, -0.25)
     assert _slow_interval(MUL, [Interval(-3.0, 2.0), Interval(-1.0, 4.0)]) == Interval(-12.0, 8.0)
+
+
+def test_numbers_known_beforehand_are_worked_out():
+    both = {ADD: 12.25, SUB: 5.75, MUL: 29.25, DIV: 9.0 / 3.25}
+    assert {operation: _number(operation, 9.0, 3.25) for operation in both} == both
+    assert (_number(NEG, 9.0, None), _number(SQRT, 9.0, None)) == (-9.0, 3.0)

@@ -177,3 +177,12 @@ def test_an_effect_is_told_the_size_of_the_log():
     timeless = setup_of(SimpleNamespace(at=Conditions(state=0.0), y=np.zeros((3, 7)), reference="vector"), fit.linear)
     assert (timeless.duration_s, timeless.interval_s) == (7.0, 7.0 / 6.0)
     assert (timeless.load_a, timeless.current_ma) == (1.0, 1.0)
+
+
+def test_a_field_spans_where_it_leaves_no_plane():
+    corners = np.array([[1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0], [1.0, 1.0, -1.0, -1.0]]) * 30.0
+    assert moments(2.0 * corners, corners).spans(0.5)
+    assert not moments(2.0 * corners[:, :3], corners[:, :3]).spans(1e-3)  # three readings lie in a plane
+    thin = corners * [[1.0], [1.0], [1e-2]]
+    assert moments(thin, thin).spans(0.9e-2)
+    assert not moments(thin, thin).spans(1.1e-2)

@@ -27,12 +27,11 @@ MOST = 5  # effects added before giving up
 
 @dataclass(frozen=True)
 class Found:
-    """An effect put in: the fit with it, its exact gain in BIC, how much it takes off the whitened sum of squares, its
-    p-value, rivals that this log cannot tell from it."""
+    """An effect put in: the fit with it, how much it takes off the whitened sum of squares, its p-value, rivals that
+    this log cannot tell from it."""
 
     effect: str
     fit: Fit
-    gain: float
     fall: float
     p_value: float
     heldout_drop: float
@@ -120,7 +119,7 @@ def doubtful_readings(evidence: Evidence, absent: Absent) -> Found | None:
     left = np.sum((residual * believable(residual)) ** 2) / np.sum(residual**2)
     fall = evidence.projection.rss * float(1.0 - left)
     drop = 1.0 - after.heldout_rms_lsb / evidence.fit.heldout_rms_lsb
-    return Found(effect.name, after, 2.0 * gain, fall, float(max(np.exp(-gain), 1e-300)), drop)
+    return Found(effect.name, after, fall, float(max(np.exp(-gain), 1e-300)), drop)
 
 
 def giant_readings(fit: Fit, absent: Absent) -> Found | None:
@@ -134,7 +133,7 @@ def giant_readings(fit: Fit, absent: Absent) -> Found | None:
     after = _weighed(fit, effect, absent, dict(zip(fit.model.names, start.tolist(), strict=True)))
     drop = 1.0 - after.heldout_rms_lsb / fit.heldout_rms_lsb
     fall = float(np.sum(fit.problem.residual(fit.p) ** 2) / after.rms_lsb**2 - residual.size)
-    return Found(effect.name, after, 2.0 * gain, max(fall, 0.0), float(max(np.exp(-gain), 1e-300)), drop)
+    return Found(effect.name, after, max(fall, 0.0), float(max(np.exp(-gain), 1e-300)), drop)
 
 
 def _loss(fit: Fit, absent: Absent) -> Effect | None:
@@ -197,7 +196,7 @@ def _found(evidence: Evidence, trials: list[Trial]) -> Found:
     drop = 1.0 - best.fit.heldout_rms_lsb / evidence.fit.heldout_rms_lsb
     place = next(p for c, p in zip(evidence.candidates, evidence.places, strict=True) if c is best.candidate)
     name = best.candidate.effect.name
-    return Found(name, best.fit, best.gain, best.fall, evidence.p_value(place), drop, tuple(rivals))
+    return Found(name, best.fit, best.fall, evidence.p_value(place), drop, tuple(rivals))
 
 
 def recheck(found: list[Found], white: Whitening, extra: Sequence[Effect] = ()) -> list[Found]:
