@@ -45,7 +45,7 @@ coverage: $(STAMP)
 lines: $(STAMP)
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m lines
 
-# Small faults put into fit, diagnosis, effects and generator, one at a time; how many the tests notice. An hour.
+# Small faults put into fit, diagnosis, effects and generator, one at a time; how many the tests notice. Half an hour.
 mutation: $(STAMP)
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m mutation
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from barberpole.diagnose import tails
-from barberpole.diagnose.evidence import bic_gain
+from barberpole.diagnose.evidence import bic_gain, unsure_of_noise
 from barberpole.diagnose.patterns import jump_patterns
 from barberpole.diagnose.resting import _medians, interval
 from barberpole.diagnose.still import level, still
@@ -273,3 +273,23 @@ def test_interval_is_the_mean_time_between_readings():
     assert interval(at_rest(y, t_s=np.array([2.0, 2.1, 2.5, 3.5]))) == pytest.approx(0.5)
     assert interval(at_rest(y)) == 0.0
     assert interval(SimpleNamespace(at=SimpleNamespace(t_s=np.array([4.0])), y=y[:, :1])) == 0.0
+
+
+def test_a_short_scalar_log_is_unsure_of_a_colour_that_it_may_hide():
+    red = np.cumsum(np.random.default_rng(4).normal(size=(1, 1000)), axis=1)
+
+    def evidence(columns, residual=red, noise=None, normal=red):
+        return SimpleNamespace(
+            white=SimpleNamespace(noise=noise or Noise(np.ones(1), source="residual")),
+            ground=SimpleNamespace(residual=residual, normal=normal),
+            table=SimpleNamespace(count=1000.0),
+            design=SimpleNamespace(count=columns),
+        )
+
+    assert unsure_of_noise(evidence(126))  # fewer than eight residuals a column
+    assert not unsure_of_noise(evidence(124))
+    assert not unsure_of_noise(evidence(126, residual=np.random.default_rng(5).normal(size=(1, 1000))))
+    coloured = Noise(np.ones(1), 0.1, source="residual")
+    assert unsure_of_noise(evidence(10, noise=coloured))
+    assert not unsure_of_noise(evidence(10, noise=Noise(np.ones(1), 0.1, source="rest")))  # that was measured
+    assert not unsure_of_noise(evidence(126, normal=None))  # three residuals a sample tell it

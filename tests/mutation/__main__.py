@@ -124,7 +124,7 @@ def tell(verdicts: list[Verdict], every: bool) -> bool:
 def main() -> int:
     """0 where enough is killed."""
     parser = argparse.ArgumentParser(prog="mutation", description=__doc__)
-    parser.add_argument("--share", type=float, default=0.05, help="of all mutants")
+    parser.add_argument("--share", type=float, default=0.03, help="of all mutants")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="", help="modules whose path contains this")
