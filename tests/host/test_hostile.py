@@ -28,7 +28,7 @@ from barberpole.paths import boards
 from barberpole.plugins import TEMPLATE, compiled, load_plugin
 from barberpole.records import encode, encode_json, parse
 from fuzzing.many import with_meta, write_fleet
-from fuzzing.one import DRIVER, driver_records, header_text
+from fuzzing.one import DRIVER, driver_records, header_text, write_logs
 
 NAMES = ("x_lsb", "y_lsb", "z_lsb")
 GOOD = "t_s,x_lsb,y_lsb,z_lsb\n0,1,2,3\n1,4,5,6\n"
@@ -381,6 +381,15 @@ def test_a_plugin_that_is_none(tmp_path, line, wanted):
 def test_a_plugin_that_is_no_python(text):
     with pytest.raises(InputError, match="valid Python"):
         compiled(text, Path("mine.py"))
+
+
+def test_models_with_nothing_to_determine(tmp_path, refused):
+    """One without parameters is refused; one whose parameters the log does not show is judged all the same."""
+    write_logs(tmp_path, "bias,scale,misalignment")
+    log = tmp_path / "field.csv"
+    for command in ("fit", "diagnose"):
+        assert "an effect that has parameters" in refused(command, log, "--model", "outliers")
+    assert run(["diagnose", str(log), "--model", "cross_field"]) == 0
 
 
 def test_a_sentence_tells_what_was_got_and_not_all_of_it():

@@ -220,8 +220,12 @@ def fit_problem(
 ) -> Fit:
     """Minimise from p, freezing what the log cannot determine, and leaving outliers out where the model says so.
 
-    Raises InputError where there are too few readings, or, against a magnitude, where they lie in a plane.
+    Raises InputError where there are too few readings, nothing to fit, or, against a magnitude, where they lie in a
+    plane.
     """
+    if not problem.model.names:
+        got = ", ".join(problem.model.effects)
+        raise InputError(must("the model", "one with an effect that has parameters (bias, scale)", got))
     if problem.n * problem.residuals_per_sample <= len(p):
         wanted = f"longer than the model has parameters ({len(p)})"
         raise CoverageError(must("the log", wanted, f"{problem.n * problem.residuals_per_sample} readings"))

@@ -64,6 +64,8 @@ def undetermined(model: Model, covariance: np.ndarray, free: np.ndarray, p: np.n
 def condition(gram: Gram, free: np.ndarray) -> float:
     """Condition number of the free parameters' columns, each brought to unit size."""
     h = gram.jj.sum(axis=0)[np.ix_(free, free)]
+    if not h.size:
+        return 1.0  # nothing to determine, so nothing to confuse
     size = np.sqrt(h.diagonal())
     values = np.linalg.eigvalsh(h / np.outer(size, size))
     return float(np.sqrt(values[-1] / max(values[0], 1e-300)))
