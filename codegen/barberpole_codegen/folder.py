@@ -48,7 +48,7 @@ def write_folder(folder: Path, content: dict[str, bytes]) -> None:
             path = beside / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
-        _exchange(beside, place, place.with_name(f"{place.name}{OLD}{token}"))
+        _exchange(beside, place, f"{place.name}{OLD}{token}")
     except OSError as error:
         raise cannot_write("the output folder", error, folder) from None
     finally:  # by Ctrl-C too
@@ -57,11 +57,11 @@ def write_folder(folder: Path, content: dict[str, bytes]) -> None:
     _sweep(place)
 
 
-def _exchange(beside: Path, folder: Path, old: Path) -> None:
+def _exchange(beside: Path, folder: Path, old: str) -> None:
     """Move the folder away and `beside` to its place; once more where another process put one there meanwhile."""
     for left in reversed(range(TRIES)):
         with contextlib.suppress(FileNotFoundError):
-            folder.rename(old)
+            folder.rename(folder.with_name(f"{old}-{left}"))  # that of the last try may still stand
         try:
             beside.rename(folder)
         except OSError as error:

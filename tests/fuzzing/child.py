@@ -45,7 +45,6 @@ class Child:
     here: Path
     pid: int
     pipe: int
-    base: int
     began: float
 
     def fileno(self) -> int:
@@ -74,7 +73,7 @@ class Child:
             return Outcome(self.case, None, _killed(os.WTERMSIG(status)))
         answer = json.loads(said)
         fault = answer["fault"] or _judged(answer["code"], answer["wrong"])
-        grown = used.ru_maxrss * 1024 - self.base
+        grown = used.ru_maxrss * 1024 - answer["base"]
         if not fault and grown > BLOATED:
             fault = f"{grown >> 20} MB of memory"
         return Outcome(self.case, answer["code"], fault, answer["said"] + answer["wrong"])
@@ -83,7 +82,6 @@ class Child:
 def start(case: Case, here: Path, good: Path) -> Child:
     """Begin a case in the new folder `here`."""
     reading, writing = os.pipe()
-    base = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
     began = time.monotonic()
     pid = os.fork()
     if pid == 0:
@@ -95,13 +93,14 @@ def start(case: Case, here: Path, good: Path) -> Child:
         finally:
             os._exit(0)
     os.close(writing)
-    return Child(case, here, pid, reading, base, began)
+    return Child(case, here, pid, reading, began)
 
 
 def _run(case: Case, here: Path, good: Path) -> dict:
     here.mkdir(parents=True)
     case.write(here)
-    loaded = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    # its own: a fork takes on what its parent has mapped of files only when it is used
+    loaded, base = (int(pages) * resource.getpagesize() for pages in Path("/proc/self/statm").read_text().split()[:2])
     resource.setrlimit(resource.RLIMIT_AS, (loaded + LARGEST, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CPU, (int(SLOW_S), resource.RLIM_INFINITY))
     said, wrong, fault, code = io.StringIO(), io.StringIO(), "", None
@@ -116,7 +115,13 @@ def _run(case: Case, here: Path, good: Path) -> dict:
         below = raw.read(2000).decode(errors="replace")
         if below and not fault:
             fault = f"a library spoke: {below}"
-    return {"code": code, "fault": fault, "said": said.getvalue()[-2000:], "wrong": wrong.getvalue()[-2000:]}
+    return {
+        "code": code,
+        "fault": fault,
+        "base": base,
+        "said": said.getvalue()[-2000:],
+        "wrong": wrong.getvalue()[-2000:],
+    }
 
 
 def _killed(number: int) -> str:
