@@ -58,6 +58,10 @@ fuzz: $(STAMP) $(VENV)/.fuzz
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m fuzzing.run --cases $(FUZZ_CASES) --seed $(FUZZ_SEED)
 	@PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python -m fuzzing.guided --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 
+# Thirty days of one emulated board, a power-up every hour: memory, flash, gains, every refused run. Four minutes.
+soak: $(STAMP)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m soak -s tests/twin/test_soak.py
+
 # Source archive and wheel of what is committed; the wheel in an empty environment, without the repository. Two minutes.
 release-check: $(STAMP)
 	@$(BIN)/python -m pytest -m 'release or not release' tests/host/test_release.py

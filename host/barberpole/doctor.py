@@ -15,6 +15,7 @@ SERVES = {  # what an optional part of the package is for
     "twin": "the emulated board: demo, twin",
     "fleet": "fleets of logs on a Dask cluster",
     "bench": "measuring against other packages",
+    "fuzz": "a search for input that breaks a reader",
     "test": "working on barberpole itself",
 }
 TOOLS = {

