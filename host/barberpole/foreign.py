@@ -77,7 +77,10 @@ def _table(data: bytes, path: Path) -> tuple[list[str], list[list[str]]]:
     lines[0] = lines[0].lstrip("# ")
     separator = next((mark for mark in SEPARATORS if mark in lines[0]), None)
     cells = csv.reader(lines, delimiter=separator) if separator else (line.split() for line in lines)
-    names, *rows = [[cell.strip() for cell in row] for row in cells]
+    try:
+        names, *rows = [[cell.strip() for cell in row] for row in cells]
+    except csv.Error as error:  # a cell of more characters than anybody writes
+        raise InputError(must("the table", "of cells", str(error), path)) from None
     for number, row in enumerate(rows, start=1):
         if len(row) != len(names):
             raise InputError(must(f"row {number}", f"{len(names)} cells wide, as its names", len(row), path))

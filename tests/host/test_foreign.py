@@ -87,6 +87,14 @@ def test_rows_of_another_width_are_refused(tmp_path):
         read_foreign(table(tmp_path, ""), TAKE)
 
 
+def test_a_cell_without_end_is_refused(tmp_path):
+    """What an open quotation mark makes of the rest of a long file."""
+    path = tmp_path / "open.csv"
+    path.write_text('t,x,y,z\n0,1,2,"3\n' + "4,5,6,7\n" * 40_000)
+    with pytest.raises(InputError, match="field larger than"):
+        read_foreign(path, ["t_s=t", "x_lsb=x", "y_lsb=y", "z_lsb=z"])
+
+
 def test_convert_makes_a_log_of_it(tmp_path, capsys):
     path, made = table(tmp_path, "Zeit;mx;my;mz\n0;1,5;2;3\n1;4;5;6\n", "odd.txt"), tmp_path / "mine.csv"
     words = [word for one in TAKE for word in ("--take", one)]
