@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from barberpole.columns import KNOWN, check_names
+from barberpole.columns import KNOWN, check_names, listed
 from barberpole.errors import InputError, must
 from barberpole.files import read_bytes
 from barberpole.log import Log, checked, file_sha256
@@ -23,7 +23,6 @@ DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 CLOCKS = ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S")  # beside ISO 8601
 STATES = {"set": 1.0, "s": 1.0, "+": 1.0, "reset": -1.0, "r": -1.0, "-": -1.0}
 EMPTY = ("", "nan", "na", "n/a", "null", "none")
-NAMED = 12  # columns that a message lists
 
 
 def read_foreign(path: str | Path, taken: Sequence[str]) -> Log:
@@ -39,13 +38,14 @@ def read_foreign(path: str | Path, taken: Sequence[str]) -> Log:
         if name in columns:
             raise InputError(must(f"column {name}", "taken once", "it twice"))
         if column not in names:
-            raise InputError(must(f"what is taken as {name}", "a column of the table", _of(column, names), path))
+            got = f"{column!r}; there are {listed(names)}"
+            raise InputError(must(f"what is taken as {name}", "a column of the table", got, path))
         cells = [row[names.index(column)] for row in rows]
         columns[name] = other_unit(_values(name, column, cells, path), name, unit)
         used.add(column)
     check_names(list(columns), path)
     left = [name for name in names if name not in used]
-    notes = (f"columns left out: {', '.join(left[:NAMED])}",) if left else ()
+    notes = (f"columns left out: {listed(left)}",) if left else ()
     return checked(Log(columns, path, file_sha256(data), notes=notes))
 
 
@@ -59,11 +59,6 @@ def _parsed(taken: str, names: Sequence[str]) -> tuple[str, str, str]:
     head, colon, unit = column.rpartition(":")
     plain = column in names or not (colon and head)  # a name may hold a colon itself
     return (name, column, "") if plain else (name, head, unit_of(unit, name))
-
-
-def _of(column: str, names: Sequence[str]) -> str:
-    more = ", ..." if len(names) > NAMED else ""
-    return f"{column!r}; there are {', '.join(names[:NAMED])}{more}"
 
 
 def _table(data: bytes, path: Path) -> tuple[list[str], list[list[str]]]:

@@ -241,6 +241,7 @@ def test_two_models_are_compared_on_held_out_data(window, crossed):
     window.wait_for_selector(".bp-fall.floor")
     window.click("text=Compare two models")
     window.wait_for_selector("[data-test=rivals]:has-text('the first is better')")
+    assert "the second is better" not in window.inner_text("[data-test=rivals]")
 
 
 def test_a_box_in_one_picture_shows_in_all_and_its_rows_can_be_left_out(window, crossed):

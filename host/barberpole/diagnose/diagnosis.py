@@ -18,6 +18,7 @@ from barberpole.diagnose.visibility import unseen, visibility
 from barberpole.diagnose.whitening import whitening
 from barberpole.effects import Effect
 from barberpole.errors import CoverageError
+from barberpole.fit.answer import FEW
 from barberpole.fit.easy_axes import with_easy_axes
 from barberpole.fit.fit import Fit, fit_observations
 from barberpole.fit.noise import Noise
@@ -27,7 +28,6 @@ from barberpole.observations import Observations, observations
 from barberpole.sensor import Sensor
 
 GEOMETRY = 30.0  # condition number of the linear part above which nothing is named (full turns: below 6)
-ROWS_EACH = 10  # residuals for each parameter below which nothing is named
 COVERED = 0.8  # of what can be explained at all must a catalogue effect explain
 ENOUGH = 10.0  # gain in BIC before anything counts as left over
 CLEAR = 0.1  # fall of the held-out error that no noise makes
@@ -120,7 +120,7 @@ def _geometry(fit: Fit) -> str:
 
 def _too_few(fit: Fit) -> str:
     """How many rows are missing for the residual to say anything, or ''."""
-    rows, wanted = np.unique(fit.problem.seen.row).size, ROWS_EACH * int(fit.free.sum())
+    rows, wanted = np.unique(fit.problem.seen.row).size, FEW * int(fit.free.sum())
     readings = fit.problem.n * fit.problem.residuals_per_sample
     if readings >= wanted:
         return ""

@@ -4,7 +4,7 @@ from typing import Any
 
 from barberpole.fit.fit import Fit
 
-FEW = 10  # residuals for each parameter: below, the errors themselves are uncertain by a quarter and more
+FEW = 10  # residuals for each parameter: below, errors are uncertain by a quarter and more, and nothing is named
 
 
 def remarks(fit: Fit) -> tuple[str, ...]:
